@@ -16,7 +16,7 @@ use super::patch::project;
 use super::query::Query;
 use super::settlement;
 use super::structure::Exact;
-use super::tangency;
+use super::tangency::{self, TANGENCY_WORK};
 use super::tolerances::{CONTACT_LENGTH, SAME_PARAMETER, TANGENT};
 use crate::intersect::Certainty;
 use crate::math::simd::{self, Instructions, Kernel};
@@ -27,7 +27,7 @@ const FINEST: f64 = 1e-13;
 /// the margin of a root.
 const BEYOND_UNIT: f64 = 1e-9;
 /// Row sums below this leave at most one root, and Newton's method a tenth of each error at worst; what lies above is halved.
-const UNIQUE: f64 = 0.9;
+const LARGEST_ROW_SUM_OF_BOX: f64 = 0.9;
 /// How far beyond its box a root counts beside twice the margin: Newton's method ends within 1e-14.
 const ROOT_ROUNDING: f64 = 1e-12;
 /// Boxes of this size are a point to Newton's method.
@@ -202,7 +202,7 @@ impl Exact {
                 }
                 keep[k] = [keep[k][0].max(0.0), keep[k][1].min(1.0)];
             }
-            if y.deviation < UNIQUE && self.take_single_root(query, clipping, node, &y, keep) {
+            if y.deviation < LARGEST_ROW_SUM_OF_BOX && self.take_single_root(query, clipping, node, &y, keep) {
                 return true;
             }
         }
@@ -294,7 +294,7 @@ impl Exact {
         let is_around =
             |p: [f64; 2]| (0..2).all(|k| (p[k] - 0.5 * (node.rect[k][0] + node.rect[k][1])).abs() <= side);
         // Which of two roots a ray leaves that starts off them by rounding, 32 digits do not tell either.
-        if clipping.at_pole || clipping.departure.is_some_and(is_around) || query.budget < tangency::WORK {
+        if clipping.at_pole || clipping.departure.is_some_and(is_around) || query.budget < TANGENCY_WORK {
             return false;
         }
         let Some(roots) = tangency::roots(self, query, clipping.leaf, clipping.seen, node.rect) else {

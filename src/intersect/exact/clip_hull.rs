@@ -12,11 +12,11 @@ const HULL_ROUNDING: f64 = 1e-13;
 /// Half ulps by which a coordinate across the ray is off, beside those of each de Casteljau step.
 const SHIFT_ROUNDING: f64 = 4.0;
 /// Newton steps in a box with one root at most.
-const STEPS: usize = 12;
+const BOX_STEPS: usize = 12;
 /// Newton's method ends at steps of this size, as a share of the box.
-const LAST_STEP: f64 = 1e-14;
+const LAST_BOX_STEP: f64 = 1e-14;
 /// Steps below this that do not get shorter are rounding.
-const STALLED_STEP: f64 = 1e-8;
+const STALLED_BOX_STEP: f64 = 1e-8;
 
 /// A leaf's net as a ray sees it.
 pub(super) struct SeenLeaf {
@@ -165,7 +165,7 @@ fn linear_hull_of_degree(net: &[V4], y: &[[f64; 2]; 2], p: usize, q: usize) -> [
 #[inline(always)]
 pub(super) fn newton(net: &[V4], degree: [u8; 2], [mut u, mut v]: [f64; 2]) -> Option<[f64; 2]> {
     let mut last = f64::INFINITY;
-    for _ in 0..STEPS {
+    for _ in 0..BOX_STEPS {
         let j = net::evaluate(net, degree, u, v);
         let inv = 1.0 / (j.su[0] * j.sv[1] - j.sv[0] * j.su[1]);
         let du = (j.sv[1] * j.s[0] - j.sv[0] * j.s[1]) * inv;
@@ -173,7 +173,7 @@ pub(super) fn newton(net: &[V4], degree: [u8; 2], [mut u, mut v]: [f64; 2]) -> O
         u -= du;
         v -= dv;
         let step = du.abs().max(dv.abs());
-        if step < LAST_STEP || (step < STALLED_STEP && step >= last) {
+        if step < LAST_BOX_STEP || (step < STALLED_BOX_STEP && step >= last) {
             return Some([u, v]);
         }
         last = step;

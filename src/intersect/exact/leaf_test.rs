@@ -18,23 +18,23 @@ use crate::intersect::Certainty;
 use crate::math::Vector;
 
 /// Row sums above this go to clipping: 5 % is kept for the rounding of `Y` and of what it is the inverse of.
-const UNIQUE: f64 = 0.95;
+const LARGEST_ROW_SUM_OF_LEAF: f64 = 0.95;
 /// Leaves that are nearly singular go to clipping where rounding moves a root by more, as a share of the leaf.
 ///
 /// A derivative is off by twice the degree, 25 at most, of what control points are off, and the inverse magnifies both alike: row sums are
-/// off by a hundred times the margin, the 5 % that [`UNIQUE`] leaves. What the inverse is off by itself, eight half ulps of the product of
-/// row sums over the determinant, is less: the margin has 32 of the leaf's radius, a seventh of a row sum, over the same.
+/// off by a hundred times the margin, the 5 % that [`LARGEST_ROW_SUM_OF_LEAF`] leaves. What the inverse is off by itself, eight half ulps
+/// of the product of row sums over the determinant, is less: the margin has 32 of the leaf's radius, a seventh of a row sum, over the same.
 const LARGEST_MARGIN: f64 = 5e-4;
 /// Rounding of parameters of a unit square: fifty ulps of its middle.
 const PARAMETER_ROUNDING: f64 = 1e-14;
 /// Newton steps on a leaf; its map is nearly linear, and three do on most.
-const STEPS: usize = 12;
+const LEAF_STEPS: usize = 12;
 /// A step this short is the last. The next would be its square times half the bend of the map over its slope, at most 16 for each degree
-/// where row sums are below [`UNIQUE`]: below [`NEWTON_STEP`]. What two steps foretell of a third is no bound, as one of them may be short
-/// by chance: on a ball one hit in 100,000 next to the border of a leaf was lost to both leaves.
-const LAST_STEP: f64 = 3e-8;
+/// where row sums are below [`LARGEST_ROW_SUM_OF_LEAF`]: below [`NEWTON_STEP`]. What two steps foretell of a third is no bound, as one of
+/// them may be short by chance: on a ball one hit in 100,000 next to the border of a leaf was lost to both leaves.
+const LAST_LEAF_STEP: f64 = 3e-8;
 /// Steps below this that do not get shorter are rounding.
-const STALLED_STEP: f64 = 1e-6;
+const STALLED_LEAF_STEP: f64 = 1e-6;
 /// Keeps reciprocals of a direction's components finite; far below any component that moves a box.
 const SMALLEST_COMPONENT: f64 = 1e-200;
 
@@ -68,7 +68,8 @@ impl Exact {
         let margin = PARAMETER_ROUNDING + noise * (y00.abs() + y01.abs() + y10.abs() + y11.abs());
         // Where it is singular the margin is infinite, or no number.
         let regular = det.abs() > SINGULAR * (a.abs() + b.abs()) * (c.abs() + d.abs());
-        if !(row_u < UNIQUE && row_v < UNIQUE && (regular || margin < LARGEST_MARGIN)) {
+        let is_unique = row_u < LARGEST_ROW_SUM_OF_LEAF && row_v < LARGEST_ROW_SUM_OF_LEAF;
+        if !(is_unique && (regular || margin < LARGEST_MARGIN)) {
             return self.clip_touched(query, index);
         }
 
@@ -105,7 +106,7 @@ impl Exact {
         let (mut u, mut v) = (clamp(0.5 + du), clamp(0.5 + dv));
         let control = leaf.net(&self.geometry.nets);
         let mut last = du.abs().max(dv.abs());
-        for _ in 0..STEPS {
+        for _ in 0..LEAF_STEPS {
             let jet = net::evaluate_inlined(control, leaf.degree, u, v);
             let ([f1, a, b], [f2, c, d]) = (projected_jet(&jet, query.n1, k1), projected_jet(&jet, query.n2, k2));
             let inv = 1.0 / (a * d - b * c);
@@ -114,7 +115,7 @@ impl Exact {
             u -= xu;
             v -= xv;
             // What is left is taken off where the hit is made.
-            if step < LAST_STEP || (step < STALLED_STEP && step >= last) {
+            if step < LAST_LEAF_STEP || (step < STALLED_LEAF_STEP && step >= last) {
                 let mut s = jet.s;
                 net::axpy(&mut s, -xu, &jet.su);
                 net::axpy(&mut s, -xv, &jet.sv);

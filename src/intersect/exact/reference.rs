@@ -14,9 +14,9 @@ use crate::nurbs::{BezierPatch, Surface, find_span};
 use smallvec::SmallVec;
 
 /// Newton steps from a root of `f64`, which has digits to begin with.
-const STEPS: usize = 12;
+const PRECISE_STEPS: usize = 12;
 /// Newton's method has converged at a step of this size, as a share of a patch: the next is below 32 digits.
-const LAST_STEP: f64 = 1e-20;
+const LAST_PRECISE_STEP: f64 = 1e-20;
 
 /// What the reference computes in.
 type Number = DoubleDouble;
@@ -168,7 +168,7 @@ impl ReferencePatch<'_> {
         let (main, others) = main_axis(d);
         let widths = [0, 1].map(|k| self.width(k));
         let mut uv = [0, 1].map(|k| widths[k] * start[k].into() + self.domain[k][0].into());
-        for _ in 0..STEPS {
+        for _ in 0..PRECISE_STEPS {
             let (p, du, dv) = self.derivatives(uv);
             let r: Point3 = std::array::from_fn(|k| p[k] - o[k].into());
             let beside = |x: &Point3, k: usize| x[k] * d[main].into() - x[main] * d[k].into();
@@ -185,8 +185,8 @@ impl ReferencePatch<'_> {
             if !(size[0].max(size[1]) < 1.0) {
                 return None;
             }
-            if size[0].max(size[1]) < LAST_STEP {
-                // Of the point after the step, in first order: the second is the square of [`LAST_STEP`].
+            if size[0].max(size[1]) < LAST_PRECISE_STEP {
+                // Of the point after the step, in first order: the second is the square of [`LAST_PRECISE_STEP`].
                 let t = (r[main] - du[main] * step[0] - dv[main] * step[1]) / d[main].into();
                 let local = [0, 1].map(|k| ((uv[k] - self.domain[k][0].into()) / widths[k]).to_f64());
                 return Some(SettledRoot { t: t.to_f64(), local, uv: Uv::new(uv[0].to_f64(), uv[1].to_f64()) });

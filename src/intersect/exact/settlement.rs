@@ -22,7 +22,7 @@ const AMBIGUOUS: f64 = 1e-11;
 /// A settled root farther than this many margins from the one that `f64` found is another one.
 const STRAYED: f64 = 4.0;
 /// Clipping steps that settling a root counts as: twenty microseconds.
-const WORK: u32 = 40;
+const SETTLEMENT_WORK: u32 = 40;
 
 /// Whether the place of a root with this margin, both in parameters of its leaf, must be settled in 32 digits.
 #[inline(always)]
@@ -42,15 +42,15 @@ enum Place {
 
 impl Exact {
     /// Finds a root on the leaf `index` again in 32 digits, and offers it if it lies on the leaf; where they find none near, or the budget
-    /// is spent, offers it as uncertified and leaves the ray undecided there. Takes [`WORK`] off the budget. `margin` is in parameters of
-    /// the leaf.
+    /// is spent, offers it as uncertified and leaves the ray undecided there. Takes [`SETTLEMENT_WORK`] off the budget. `margin` is in
+    /// parameters of the leaf.
     #[cold]
     pub(super) fn settle(&self, query: &mut Query, index: u32, found: Candidate, margin: [f64; 2]) {
         // Charged to the ray's budget and given up with it, so that a ray along a border, of which every root is open, ends as others do.
         if query.budget == 0 {
             return self.leave_open(query, index, found);
         }
-        query.budget = query.budget.saturating_sub(WORK);
+        query.budget = query.budget.saturating_sub(SETTLEMENT_WORK);
         let leaf = &self.leaves[index as usize];
         let patch = &self.geometry.patches[leaf.patch as usize];
         let start = leaf.patch_parameters(found.local);

@@ -19,11 +19,11 @@ const SEEDS: f64 = 64.0;
 const STATIONS: f64 = (1u64 << 40) as f64;
 
 /// Steps of Newton's method to the nearest point.
-const STEPS: usize = 24;
+const EDGE_STEPS: usize = 24;
 /// The longest step, in seeds: as far as a seed may be trusted to be on the right turn of the curve.
 const LONGEST_STEP: f64 = 4.0 / SEEDS;
 /// Steps of the parameter below this are rounding.
-const LAST_STEP: f64 = 1e-15;
+const LAST_EDGE_STEP: f64 = 1e-15;
 /// Square of the least sine between a ray and an edge that it passes.
 const LEAST_SINE_SQUARED: f64 = 1e-20;
 /// As [`LEAST_SINE_SQUARED`], not squared, for chords.
@@ -63,11 +63,11 @@ fn nearest_passage(curve: &Curve, near: f64, [o, n1, n2]: [Vector; 3]) -> Option
         let length = d[0] * d[0] + d[1] * d[1];
         (length > LEAST_SINE_SQUARED * c.first.length_squared()).then_some((x, d, length))
     };
-    for _ in 0..STEPS {
+    for _ in 0..EDGE_STEPS {
         let (x, d, length) = at(s)?;
         let step = (x[0] * d[0] + x[1] * d[1]) / (length * (t1 - t0));
         let next = (s - step.clamp(-LONGEST_STEP, LONGEST_STEP)).clamp(0.0, 1.0);
-        let done = (next - s).abs() <= LAST_STEP;
+        let done = (next - s).abs() <= LAST_EDGE_STEP;
         s = next;
         if done {
             break;

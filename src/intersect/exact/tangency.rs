@@ -37,7 +37,7 @@ const SHARED: f64 = 1e-9;
 /// φ″ must not vary by more, so that steps by its mean get shorter.
 const LEAST_BEND: f64 = 0.1;
 /// Steps towards the place where the ray runs along the surface.
-const STEPS: usize = 12;
+const DESCENT_STEPS: usize = 12;
 /// Rays that pass a surface farther off than this many contacts and margins are told by halving, in a tenth of the time.
 const NEAR_CONTACTS: f64 = 4.0;
 const NEAR_MARGINS: f64 = 1e3;
@@ -49,7 +49,7 @@ const HEIGHT_ROUNDING: f64 = 1e-27;
 /// Clipping steps that looking for a bend counts as: two microseconds.
 const BEND_WORK: u32 = 4;
 /// Clipping steps that the search in 32 digits counts as, whether it finds or not: 150 to 300 microseconds.
-pub(super) const WORK: u32 = 400;
+pub(super) const TANGENCY_WORK: u32 = 400;
 
 type Number = DoubleDouble;
 type Range = [f64; 2];
@@ -107,7 +107,7 @@ pub(super) fn roots(
         return None;
     }
     let reference = exact.geometry.reference(patch);
-    query.budget = query.budget.saturating_sub(WORK);
+    query.budget = query.budget.saturating_sub(TANGENCY_WORK);
     simd::dispatch(Search { reference, query, leaf, frame: seen.frame, net: &net, bend: &bend, from, extent })
 }
 
@@ -188,7 +188,7 @@ impl Bend {
         let Self { p, q, along, across, .. } = *self;
         let part = |e: [f64; 2], x: &V4| e[0] * x[0] + e[1] * x[1];
         let (mut x, mut height) = ([0.5; 2], f64::INFINITY);
-        for _ in 0..STEPS {
+        for _ in 0..DESCENT_STEPS {
             let jet = net::evaluate(net, degree, x[0], x[1]);
             let columns = [&jet.su, &jet.sv];
             let (h_p, h_q) = (part(along, columns[p]), part(along, columns[q]));
@@ -287,7 +287,7 @@ impl Search<'_> {
         let largest = self.query.o.abs().max_element() + self.leaf.center.abs().max_element() + self.leaf.radius;
         let rounding = HEIGHT_ROUNDING * largest;
         let mut local = [0, 1].map(|k: usize| Number::from(self.from[k]) + (0.5 * self.extent[k]).into());
-        for _ in 0..STEPS {
+        for _ in 0..DESCENT_STEPS {
             let x = self.share(&local);
             if !(0.0..=1.0).contains(&x[q]) {
                 return None;

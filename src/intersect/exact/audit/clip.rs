@@ -40,7 +40,7 @@ impl View {
 }
 
 /// Steps for a patch and a ray: a simple root takes about ten, a graze hundreds.
-const STEPS: u32 = 4000;
+const CLIPPING_STEPS: u32 = 4000;
 /// Boxes smaller than this part of a patch are asked whether their root is single.
 const SMALL: f64 = 0.02;
 /// Boxes are asked over this much more at least, as parts of a patch, so that rounding leaves something on all sides.
@@ -114,7 +114,7 @@ impl<'a> PatchClipping<'a> {
             }
             // Out of work: what is left lies no nearer than its nearest control point, and the caller learns from where on nothing is
             // known.
-            if steps > STEPS {
+            if steps > CLIPPING_STEPS {
                 exhausted = exhausted.min(piece.net.nearest());
                 continue;
             }
