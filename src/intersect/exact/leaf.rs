@@ -29,8 +29,8 @@ pub(super) struct Leaf {
     /// Axes of the oriented box: tangent, tangent, normal.
     pub(super) axes: [Vector; 3],
     /// The oriented box about the centre, along `axes`.
-    pub(super) olo: Vector,
-    pub(super) ohi: Vector,
+    pub(super) box_low: Vector,
+    pub(super) box_high: Vector,
     /// Largest coordinate of a control point about the centre.
     pub(super) radius: f64,
     /// Bound of the error of the control points, mm.
@@ -142,20 +142,20 @@ pub(super) fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: 
     let placed = PLACED_ROUNDING * ROUND * center.abs().max_element();
     let slop = steps * ROUND * (size(piece) + offset.abs().max_element() + radius) + placed;
     let (mut lo, mut hi) = (Vector::INFINITY, Vector::NEG_INFINITY);
-    let (mut olo, mut ohi) = (lo, hi);
+    let (mut box_low, mut box_high) = (lo, hi);
     for p in &centred {
         let p = at(p);
         (lo, hi) = (lo.min(p), hi.max(p));
         let along = Vector::new(p.dot(axes[0]), p.dot(axes[1]), p.dot(axes[2]));
-        (olo, ohi) = (olo.min(along), ohi.max(along));
+        (box_low, box_high) = (box_low.min(along), box_high.max(along));
     }
     // Adding the centre rounds the corners once more.
     let pad = slop + PLACED_ROUNDING * ROUND * (center.abs().max_element() + radius);
     let leaf = Leaf {
         center,
         axes,
-        olo: olo - pad,
-        ohi: ohi + pad,
+        box_low: box_low - pad,
+        box_high: box_high + pad,
         radius,
         slop,
         reach: REACH,
@@ -203,8 +203,8 @@ pub(super) fn widen(described: &mut Described, border: [[bool; 2]; 2], band: f64
     if border.iter().flatten().any(|&b| b) {
         bounds.min -= far;
         bounds.max += far;
-        leaf.olo -= far;
-        leaf.ohi += far;
+        leaf.box_low -= far;
+        leaf.box_high += far;
     }
 }
 

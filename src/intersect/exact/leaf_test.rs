@@ -212,7 +212,7 @@ fn touches_oriented_box(query: &Query, leaf: &Leaf, oc: Vector, noise: f64) -> b
     for k in 0..3 {
         let (o, d) = (oc.dot(leaf.axes[k]), query.d.dot(leaf.axes[k]));
         let inv = 1.0 / if d.abs() < SMALLEST_COMPONENT { SMALLEST_COMPONENT.copysign(d) } else { d };
-        let (a, b) = ((leaf.olo[k] - noise - o) * inv, (leaf.ohi[k] + noise - o) * inv);
+        let (a, b) = ((leaf.box_low[k] - noise - o) * inv, (leaf.box_high[k] + noise - o) * inv);
         let (x, y) = if a < b { (a, b) } else { (b, a) };
         near = if x > near { x } else { near };
         far = if y < far { y } else { far };
