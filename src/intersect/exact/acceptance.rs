@@ -78,13 +78,13 @@ impl Exact {
         let (su, sv) = (across(du, 0), across(dv, 1));
         // The first fundamental form of the surface as the ray sees it: trims live in (u, v), bands are in mm.
         let metric = [su.length_squared(), su.dot(sv), sv.length_squared()];
-        let mut place = trim.locate(uv, metric, face.flagged);
+        let mut place = trim.locate(uv, metric, face.flagging_distance);
         let owner = |n: u32| -> &EdgeUse { &trim.uses[n as usize] };
         place.near.retain(|n| n.distance <= self.geometry.flagging_distance(owner(n.owner).gap, &face.placement));
         // Two radii: within the wider one, which grows with the file's gaps, a root is only flagged; within the
         // band the shared edge decides.
         let flagged = !place.near.is_empty();
-        place.near.retain(|n| n.distance <= face.band);
+        place.near.retain(|n| n.distance <= face.deciding_distance);
         if place.near.is_empty() {
             return (place.inside, flagged);
         }

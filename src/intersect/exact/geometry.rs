@@ -14,7 +14,7 @@ use rustc_hash::FxHashMap;
 /// Gaps wider than this where the part stands are not bridged, but flagged, mm: solids with wider ones are not closed to any reader.
 pub(super) const WIDEST_GAP: f64 = 0.05;
 /// A file's edge may lie off its faces by their gap: each of the two faces must look that far, and as far again for the other's.
-const BAND_OF_GAP: f64 = 2.0;
+const DECIDING_OF_GAP: f64 = 2.0;
 /// A vertex decides by its sectors as far off as this many times the distance by which an edge's end misses it.
 const RADIUS_OF_MISS: f64 = 4.0;
 
@@ -35,10 +35,10 @@ pub(super) struct FaceRecord {
     /// Index into [`Geometry::edges`].
     pub(super) part: u32,
     /// Distance from a trim within which the side of the shared edge decides, mm.
-    pub(super) band: f64,
+    pub(super) deciding_distance: f64,
     /// Largest distance from a trim within which a root is flagged, mm: as far as the faces of the file lie off their edges, and
-    /// more for rays that graze them.
-    pub(super) flagged: f64,
+    /// more for rays that graze them. That of one edge is [`Geometry::flagging_distance`].
+    pub(super) flagging_distance: f64,
     /// Instance and shell, of faces of closed shells.
     pub(super) solid: Option<[u32; 2]>,
 }
@@ -58,8 +58,8 @@ pub(super) struct Geometry {
     pub(super) edges: Vec<Vec<Curve>>,
     /// The vertices at their ends, and [`RADIUS_OF_MISS`] times the farthest that an end misses each, in the part's coordinates and units.
     pub(super) ends: Vec<Vec<[(Point, f64); 2]>>,
-    /// Smallest distance from a trim that is flagged, mm.
-    pub(super) band: f64,
+    /// Smallest distance from a trim that is flagged, mm of the world.
+    pub(super) world_band: f64,
     /// Largest coordinate that starts were rounded at elsewhere, mm; 0 where they are the model's own.
     pub(super) farthest_start: f64,
     /// Position in `faces` of each placed face that has a surface.
@@ -69,12 +69,12 @@ pub(super) struct Geometry {
 }
 
 impl Geometry {
-    /// Prepares all placed faces of a model: surfaces and trims once a part, patches once a place. `band` is the least distance from a trim
-    /// that is flagged, `farthest_start` the largest coordinate that starts were rounded at elsewhere, mm.
-    pub(super) fn new(model: &Model, band: f64, farthest_start: f64) -> Self {
+    /// Prepares all placed faces of a model: surfaces and trims once a part, patches once a place. `world_band` is the least distance from
+    /// a trim that is flagged, `farthest_start` the largest coordinate that starts were rounded at elsewhere, mm.
+    pub(super) fn new(model: &Model, world_band: f64, farthest_start: f64) -> Self {
         let curves = |part: &Part| part.edges.iter().map(|e| e.curve.clone()).collect();
         let mut geometry = Self {
-            band,
+            world_band,
             farthest_start,
             edges: model.parts.iter().map(curves).collect(),
             ends: model.parts.iter().map(edge_ends).collect(),
@@ -97,8 +97,8 @@ impl Geometry {
                     let (_, grid) = *shared.entry(face as *const Face).or_insert_with(|| {
                         let grid = PatchGrid::new(face);
                         let gaps = &gaps[placed.part.0 as usize];
-                        let widest_band = band / least_scale[placed.part.0 as usize];
-                        geometry.trims.push(Trim::new(face, grid.closed, widest_band, gaps));
+                        let part_band = world_band / least_scale[placed.part.0 as usize];
+                        geometry.trims.push(Trim::new(face, grid.closed, part_band, gaps));
                         geometry.grids.push(grid);
                         geometry.surfaces.push(face.surface.clone());
                         (geometry.trims.len() as u32 - 1, geometry.grids.len() as u32 - 1)
@@ -136,7 +136,7 @@ impl Geometry {
 
     /// Distance from a trim, mm, within which a root is flagged where the faces along it lie `gap`, in the units of the part, off the edge.
     pub(super) fn flagging_distance(&self, gap: f64, placement: &Frame) -> f64 {
-        self.band.max(FLAGGED_OF_GAP * gap * placement.scale)
+        self.world_band.max(FLAGGED_OF_GAP * gap * placement.scale)
     }
 
     /// Adds a face at its place, with patches that are placed there; `trim` and `grid` are those of its part.
@@ -153,8 +153,8 @@ impl Geometry {
         self.by_id.insert(placed.id, record);
         let first_patch = self.patches.len() as u32;
         let placement = *placed.placement;
-        let band = self.band.max(BAND_OF_GAP * (face.gap * placement.scale).min(WIDEST_GAP));
-        let flagged = self.flagging_distance(self.trims[trim as usize].widest_gap(), &placement);
+        let deciding_distance = self.world_band.max(DECIDING_OF_GAP * (face.gap * placement.scale).min(WIDEST_GAP));
+        let flagging_distance = self.flagging_distance(self.trims[trim as usize].widest_gap(), &placement);
         let part = placed.part.0;
         self.faces.push(FaceRecord {
             id: placed.id,
@@ -164,8 +164,8 @@ impl Geometry {
             grid,
             placement,
             part,
-            band,
-            flagged,
+            deciding_distance,
+            flagging_distance,
             solid,
         });
         for mut patch in face.surface.bezier_patches() {
@@ -306,7 +306,7 @@ mod tests {
         model.instances.push(Instance { part: PartId(0), placement: smaller, ..model.instances[0].clone() });
         let geometry = Geometry::new(&model, 1e-6, 0.0);
         // Half a unit is wider than what is bridged, and 5 µm where a unit is 10 µm.
-        let bands: Vec<f64> = geometry.faces.iter().map(|f| f.band).collect();
-        assert_eq!(bands, [2.0 * WIDEST_GAP, 2.0 * 0.005]);
+        let distances: Vec<f64> = geometry.faces.iter().map(|f| f.deciding_distance).collect();
+        assert_eq!(distances, [2.0 * WIDEST_GAP, 2.0 * 0.005]);
     }
 }

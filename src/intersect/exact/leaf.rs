@@ -14,8 +14,8 @@ use crate::math::{Aabb, Vector};
 const EXTRACTIONS: f64 = 4.0;
 /// Half ulps of a leaf's place by which its rounded centre makes neighbours drift apart, far from the origin.
 const PLACED_ROUNDING: f64 = 8.0;
-/// Roots count beyond a trimmed border as far as this many bands: on grazed faces they stray by the inverse of the sine.
-const BANDS_BEYOND: f64 = 32.0;
+/// Roots count beyond a trimmed border as far as this many deciding distances: on grazed faces they stray by the inverse of the sine.
+const BEYOND_OF_DECIDING: f64 = 32.0;
 /// The part of a patch that is all of it, in the patch's local parameters.
 pub(super) const WHOLE_PATCH: [[f64; 2]; 2] = [[0.0, 1.0]; 2];
 /// A Jacobian whose determinant is a smaller part of the product of its row sums says nothing of which halving helps.
@@ -184,12 +184,13 @@ pub(super) fn border_sides(grid: &PatchGrid, patch: &Patch, rect: [[f64; 2]; 2])
     })
 }
 
-/// Widens the reach and boxes of a leaf on sides where `border` says that the surface ends, so that roots up to [`BANDS_BEYOND`] times
-/// `band` mm beyond count: the side of the shared edge decides there, not the end of the surface. Elsewhere another leaf begins.
-pub(super) fn widen(described: &mut Described, border: [[bool; 2]; 2], band: f64) {
+/// Widens the reach and boxes of a leaf on sides where `border` says that the surface ends, so that roots up to
+/// [`BEYOND_OF_DECIDING`] times `deciding_distance`, mm, beyond count: the side of the shared edge decides there, not the end of the
+/// surface. Elsewhere another leaf begins.
+pub(super) fn widen(described: &mut Described, border: [[bool; 2]; 2], deciding_distance: f64) {
     let Described { leaf, bounds, slopes, .. } = described;
     // No farther than half of the extension: beyond the extension the derivative boxes prove nothing.
-    let far = BANDS_BEYOND * band;
+    let far = BEYOND_OF_DECIDING * deciding_distance;
     for (d, slope) in [&slopes.u, &slopes.v].into_iter().enumerate() {
         let beyond = (far / xyz(slope).length().max(f64::MIN_POSITIVE)).clamp(NEWTON_STEP, 0.5 * EXTENSION);
         if border[d][0] {

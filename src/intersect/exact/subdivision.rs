@@ -265,7 +265,7 @@ impl Subdivision<'_> {
         // Only a leaf that a trim passes asks the shared edge which side a root lies on.
         if !self.trim.whole && !part.leaf.whole {
             let border = border_sides(&self.geometry.grids[face.grid as usize], self.patch, rect);
-            widen(&mut part, border, face.band);
+            widen(&mut part, border, face.deciding_distance);
         }
         let Described { mut leaf, bounds, slopes, net: control } = part;
         let middle = net::evaluate(&control, self.patch.degree, 0.5, 0.5).s;

@@ -84,9 +84,9 @@ pub(super) struct Trim {
 }
 
 impl Trim {
-    /// Prepares the trims of a face: the widest `band` of any place where its part stands, in which directions its surface is `closed`, and
-    /// the gap of each edge of its part, lengths in the units of the part. Without loops the face is whole.
-    pub(super) fn new(face: &Face, closed: [bool; 2], band: f64, gaps: &[f64]) -> Self {
+    /// Prepares the trims of a face: in which directions its surface is `closed`, the widest band of any place where its part stands, and
+    /// the gap of each edge of its part, both lengths in the units of the part. Without loops the face is whole.
+    pub(super) fn new(face: &Face, closed: [bool; 2], part_band: f64, gaps: &[f64]) -> Self {
         let [[u0, u1], [v0, v1]] = face.surface.domain();
         let extent = Uv::new(u1 - u0, v1 - v0);
         let segments: usize = face.loops.iter().flat_map(|l| &l.uses).map(|u| u.uv.points.len()).sum();
@@ -99,7 +99,7 @@ impl Trim {
         };
         let uses = edge_uses(face, closed, gaps);
         let widest = uses.iter().map(|u| u.gap).fold(0.0, f64::max);
-        let reach = cell_margin(face, extent, band.max(FLAGGED_OF_GAP * widest));
+        let reach = cell_margin(face, extent, part_band.max(FLAGGED_OF_GAP * widest));
         let ([lo, hi], ends) = grid_bounds(face, reach);
         let cell = (hi - lo) / n as f64;
         let mut trim = Self {
@@ -352,7 +352,7 @@ fn grid_bounds(face: &Face, reach: Uv) -> ([Uv; 2], [[bool; 2]; 2]) {
 /// How far, in u and v, a cell must keep from a trimming curve to be decided: [`REACH_OF_BAND`] bands as if parameters ran evenly along the
 /// longest row of control points, held between [`LEAST_REACH`] and [`LARGEST_REACH`] of the domain. No proof where parameters run more
 /// unevenly than that, or a face is so short that the largest holds.
-fn cell_margin(face: &Face, extent: Uv, band: f64) -> Uv {
+fn cell_margin(face: &Face, extent: Uv, part_band: f64) -> Uv {
     let [nu, nv] = face.surface.counts();
     let point = |i: usize, j: usize| face.surface.points[i * nv + j].project();
     let longest = |outer: usize, inner: usize, at: &dyn Fn(usize, usize) -> crate::math::Point| {
@@ -364,6 +364,6 @@ fn cell_margin(face: &Face, extent: Uv, band: f64) -> Uv {
     let along_v = longest(nu, nv, &|i, j| point(i, j));
     // As if parameters ran evenly along the longest row of control points. Clamped: of a face of no length the margin would be
     // infinite, of a huge one below the digits of its parameters.
-    let relative = |length: f64| (REACH_OF_BAND * band / length).clamp(LEAST_REACH, LARGEST_REACH);
+    let relative = |length: f64| (REACH_OF_BAND * part_band / length).clamp(LEAST_REACH, LARGEST_REACH);
     Uv::new(extent.x * relative(along_u), extent.y * relative(along_v))
 }
