@@ -7,7 +7,7 @@
 
 use super::acceptance::Candidate;
 use super::clip_hull::{
-    Preconditioner, SeenLeaf, halving_rounding, hull, linear_hull, newton, precondition, range_along, seen_along,
+    Preconditioner, SeenLeaf, homogeneous_margin, hull, linear_hull, newton, precondition, range_along, seen_along,
     tangent_frame,
 };
 use super::leaf::Leaf;
@@ -102,12 +102,11 @@ impl Exact {
         query.clips += 1;
         let leaf = &self.leaves[index as usize];
         let oc = query.o - leaf.center;
-        let (net, size) = seen_along(query, leaf.net(&self.geometry.nets), oc);
+        let net = seen_along(query, leaf.net(&self.geometry.nets), oc);
         let noise = self.noise(leaf, oc);
-        let heaviest = net.iter().map(|p| p[3]).fold(0.0, f64::max);
-        let margin = size.map(|s| heaviest * noise + halving_rounding(leaf) * s);
+        let homogeneous_margin = homogeneous_margin(leaf, &net, noise);
         let departure = query.departure.and_then(|own| own.local_to(leaf, query.o, &self.geometry));
-        let seen = &SeenLeaf { net, frame: [query.n1, query.n2], margin, precise: false };
+        let seen = &SeenLeaf { net, frame: [query.n1, query.n2], homogeneous_margin, precise: false };
         let patch = || &self.geometry.patches[leaf.patch as usize];
         let at_pole =
             leaf.has_pole && self.geometry.passes_pole(patch(), [query.o, query.d], CONTACT_LENGTH * leaf.contact);
@@ -130,11 +129,9 @@ impl Exact {
         let frame = tangent_frame(seen, leaf.degree, query.d);
         let reference = self.geometry.reference(&self.geometry.patches[leaf.patch as usize]);
         let net = reference.net_along([query.o, query.d], frame, leaf.rect);
-        let largest = |k: usize| net.iter().map(|p| p[k].abs()).fold(0.0, f64::max);
         let reach = query.o.abs().max_element() + leaf.center.abs().max_element() + leaf.radius;
-        let rounding = PRECISE_ROUNDING * reach * largest(3);
-        let margin = [0, 1].map(|k| halving_rounding(leaf) * largest(k) + rounding);
-        let seen = &SeenLeaf { net, frame, margin, precise: true };
+        let homogeneous_margin = homogeneous_margin(leaf, &net, PRECISE_ROUNDING * reach);
+        let seen = &SeenLeaf { net, frame, homogeneous_margin, precise: true };
         self.clip_seen(query, &Clipping { index, seen, ..clipping });
     }
 
@@ -185,14 +182,14 @@ impl Exact {
     #[inline(always)]
     fn clip_node(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node, stack: &mut Vec<Node>) -> bool {
         let (degree, seen) = (clipping.leaf.degree, clipping.seen);
-        let Some(hull) = hull(&node.net, seen.margin) else { return true };
+        let Some(hull) = hull(&node.net, seen.homogeneous_margin) else { return true };
         if hull.near > query.t_max || hull.far < query.t_min - TANGENT {
             return true;
         }
         // What the preconditioned hull leaves of the box, and its root where there is one at most.
         let mut keep = [[0.0, 1.0]; 2];
         let slopes = net::slopes(&node.net, degree);
-        if let Some(y) = precondition(&slopes, degree, seen.margin) {
+        if let Some(y) = precondition(&slopes, degree, seen.homogeneous_margin) {
             // Wider by what rounding may move a root, so that no cut parts a root from its box.
             keep = linear_hull(&node.net, degree, &y.inverse);
             for k in 0..2 {

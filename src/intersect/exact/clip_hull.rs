@@ -24,8 +24,8 @@ pub(super) struct SeenLeaf {
     pub(super) net: Net,
     /// The directions of the two coordinates across.
     pub(super) frame: [Vector; 2],
-    /// Bound of the rounding of these two, in homogeneous units.
-    pub(super) margin: [f64; 2],
+    /// Bound of the rounding of these two, in homogeneous units: [`homogeneous_margin`].
+    pub(super) homogeneous_margin: [f64; 2],
     /// Whether it comes from the surface as given in 32 digits.
     pub(super) precise: bool,
 }
@@ -83,27 +83,37 @@ pub(super) fn hull(net: &[V4], margin: [f64; 2]) -> Option<Hull> {
     Some(Hull { near, far, across: largest / least_weight.max(f64::MIN_POSITIVE) })
 }
 
-/// Turns control points about a leaf's centre into a net in the ray's frame (across, across, along, weight), and returns the largest
-/// coordinates across too. `oc` is the ray's origin less that centre.
+/// Turns control points about a leaf's centre into a net in the ray's frame (across, across, along, weight). `oc` is the ray's origin less
+/// that centre.
 #[inline(always)]
-pub(super) fn seen_along(query: &Query, control: &[V4], oc: glam::DVec3) -> (Net, [f64; 2]) {
+pub(super) fn seen_along(query: &Query, control: &[V4], oc: glam::DVec3) -> Net {
     // The origin is taken off in homogeneous form, A − o·W, which stays linear in the control points: no division,
     // no further rounding.
     let (k1, k2, kd) = (query.n1.dot(oc), query.n2.dot(oc), query.d.dot(oc));
-    let mut size = [0f64; 2];
     let mut net = Net::from_slice(control);
     for p in &mut net {
         let a = glam::DVec3::new(p[0], p[1], p[2]);
         *p = [query.n1.dot(a) - k1 * p[3], query.n2.dot(a) - k2 * p[3], query.d.dot(a) - kd * p[3], p[3]];
-        size = [size[0].max(p[0].abs()), size[1].max(p[1].abs())];
     }
-    (net, size)
+    net
+}
+
+/// Bound of the rounding of a leaf's two coordinates across a ray, in homogeneous units: what they are off before any halving, up to
+/// `noise` mm, times the largest weight, and what halvings of the net add.
+#[inline(always)]
+pub(super) fn homogeneous_margin(leaf: &Leaf, net: &[V4], noise: f64) -> [f64; 2] {
+    let (mut largest, mut heaviest) = ([0f64; 2], 0f64);
+    for p in net {
+        largest = [largest[0].max(p[0].abs()), largest[1].max(p[1].abs())];
+        heaviest = heaviest.max(p[3]);
+    }
+    largest.map(|x| heaviest * noise + halving_rounding(leaf) * x)
 }
 
 /// Bound of what halvings round, as a share of a leaf's largest coordinate: at each level one rounding a degree, relative to a net half as
 /// large as the one before, so that all levels together take twice what the first does.
 #[inline(always)]
-pub(super) fn halving_rounding(leaf: &Leaf) -> f64 {
+fn halving_rounding(leaf: &Leaf) -> f64 {
     (SHIFT_ROUNDING + 2.0 * (f64::from(leaf.degree[0]) + f64::from(leaf.degree[1]))) * ROUND
 }
 

@@ -97,7 +97,7 @@ pub(super) fn roots(
     let beyond = wide.as_flattened().iter().map(|&x| (-x).max(x - 1.0)).fold(0.0, f64::max);
     let steps = 2 * (leaf.degree[0] + leaf.degree[1]);
     let grown = (0..steps).fold(1.0, |grown, _| grown * (1.0 + 2.0 * beyond));
-    let margin = seen.margin.map(|m| m * grown);
+    let margin = seen.homogeneous_margin.map(|m| m * grown);
     let bend = Bend::new(&net, leaf.degree, margin)?;
     let from = leaf.patch_parameters(wide.map(|[low, _]| low));
     let extent = [0, 1].map(|k: usize| (leaf.rect[k][1] - leaf.rect[k][0]) * (wide[k][1] - wide[k][0]));
