@@ -379,6 +379,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "acceptance",
             "settlement",
             "clip_hull",
+            "clip_box",
             "tangency",
             "clip",
             "leaf_test",

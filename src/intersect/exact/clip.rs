@@ -6,12 +6,13 @@
 //! in 32 digits, and what these leave is reported as tangent or uncertified, never dropped.
 
 use super::acceptance::Candidate;
+use super::clip_box::{FINEST, Node, cut, halve, size};
 use super::clip_hull::{
     Preconditioner, SeenLeaf, homogeneous_margin, hull, linear_hull, newton, precondition, range_along, seen_along,
     tangent_frame,
 };
 use super::leaf::Leaf;
-use super::net::{self, Net, Slopes, V4};
+use super::net::{self, Net};
 use super::patch::project;
 use super::query::Query;
 use super::settlement;
@@ -21,8 +22,6 @@ use super::tolerances::{CONTACT_LENGTH, SAME_PARAMETER, TANGENT};
 use crate::intersect::Certainty;
 use crate::math::simd::{self, Instructions, Kernel};
 
-/// Smallest box of parameters: below some hundred ulps halving says nothing.
-const FINEST: f64 = 1e-13;
 /// A leaf whose roots count no farther beyond its unit square than this is clipped over that alone: what lies beyond is within
 /// the margin of a root.
 const BEYOND_UNIT: f64 = 1e-9;
@@ -35,8 +34,6 @@ const POINT_BOX: f64 = 1e-7;
 /// A box of which the hull leaves less than this share is cut down, others are halved: Nishita, Sederberg and Kakimoto halve above
 /// 0.8, but a halving costs half of a cut.
 const WORTH_CUTTING: f64 = 0.6;
-/// The least part of a box that a cut leaves, so that it keeps an inside.
-const LEAST_CUT: f64 = 1e-15;
 /// A box of this size that still holds more than one root is asked for a tangency: most rays that graze a surface have found theirs.
 const TANGENCY_BOX: f64 = 1.0 / 64.0;
 /// How far beyond its leaf a net from 32 digits is looked at, as a share of the leaf.
@@ -45,19 +42,8 @@ const CRACK: f64 = 1e-8;
 const PRECISE_WORK: u32 = 100;
 /// Relative error of such a net's coordinates: that of a thousand roundings of 2⁻¹⁰⁴, twenty times over.
 const PRECISE_ROUNDING: f64 = 1e-27;
-/// A side along which the ray's distance changes by a smaller share of what it does along the other is not halved.
-const ALIKE: f64 = 1e-6;
 /// Points times degrees of a bicubic net, on which a step takes half a microsecond.
 const BICUBIC_WORK: usize = 96;
-
-/// A box of parameters with the net over it.
-struct Node {
-    net: Net,
-    /// In the leaf's parameters.
-    rect: [[f64; 2]; 2],
-    /// The least t that its hull leaves.
-    near: f64,
-}
 
 /// What is clipped.
 struct Clipping<'a> {
@@ -337,61 +323,5 @@ impl Exact {
         let [a, b] = clipping.seen.frame.map(|n| n.dot(normal));
         let bound = own.off + 2.0 * clipping.noise;
         node.net.iter().all(|p| (a * p[0] + b * p[1]).abs() <= bound * p[3])
-    }
-}
-
-/// Lengths of a box's sides.
-#[inline(always)]
-fn size(rect: &[[f64; 2]; 2]) -> [f64; 2] {
-    rect.map(|[lo, hi]| hi - lo)
-}
-
-/// The part of a node over `keep`, a rectangle in shares of its sides; `near` is its least t.
-#[inline(always)]
-fn cut(node: &Node, degree: [u8; 2], keep: [[f64; 2]; 2], near: f64) -> Node {
-    let mut net = Net::from_slice(&node.net);
-    let mut rect = node.rect;
-    for d in 0..2 {
-        let [low, high] = keep[d];
-        // A side that keeps its length is left alone: de Casteljau would only round it.
-        if high - low < 1.0 {
-            let range = [low, high.max(low + LEAST_CUT)];
-            net::restrict(&mut net, degree, d, range);
-            let [a, b] = rect[d];
-            rect[d] = [a + (b - a) * range[0], a + (b - a) * range[1]];
-        }
-    }
-    Node { net, rect, near }
-}
-
-/// Halves a node across its longer side, but across neither one along which next to nothing moves across the ray nor one of [`FINEST`], and
-/// puts the nearer half on top of the stack.
-#[inline(always)]
-fn halve(node: &Node, degree: [u8; 2], slopes: &Slopes, stack: &mut Vec<Node>) {
-    // The first derivative is as long as its middle and its radius allow: a side is at most that.
-    let longest = |m: &V4, r: &V4, count: usize| (0..count).map(|c| m[c].abs() + r[c]).fold(0.0, f64::max);
-    let lengths = [longest(&slopes.u, &slopes.ru, 3), longest(&slopes.v, &slopes.rv, 3)];
-    let across = [longest(&slopes.u, &slopes.ru, 2), longest(&slopes.v, &slopes.rv, 2)];
-    // Where the ray runs along a straight line of the surface, halves of that line are alike.
-    let v_alike = across[1] < ALIKE * across[0];
-    let u_first = v_alike || (across[0] >= ALIKE * across[1] && lengths[0] >= lengths[1]);
-    let [size_u, size_v] = size(&node.rect);
-    // A side of the finest size stays: its two halves could no longer be told apart.
-    let direction = if (u_first && size_u > FINEST) || size_v <= FINEST { 0 } else { 1 };
-    let [low, high] = net::halves(&node.net, degree, direction);
-    let nearest = [range_along(&low).0, range_along(&high).0];
-    let middle = 0.5 * (node.rect[direction][0] + node.rect[direction][1]);
-    let (mut low_rect, mut high_rect) = (node.rect, node.rect);
-    low_rect[direction][1] = middle;
-    high_rect[direction][0] = middle;
-    let low = Node { net: low, rect: low_rect, near: nearest[0] };
-    let high = Node { net: high, rect: high_rect, near: nearest[1] };
-    // Taken first, the nearer half may find a root that ends the search of the other.
-    if nearest[0] <= nearest[1] {
-        stack.push(high);
-        stack.push(low);
-    } else {
-        stack.push(low);
-        stack.push(high);
     }
 }

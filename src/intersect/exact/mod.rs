@@ -26,6 +26,7 @@ mod acceptance;
 mod answer;
 pub mod audit;
 mod clip;
+mod clip_box;
 mod clip_hull;
 mod double_double;
 mod edge_use;
