@@ -45,6 +45,17 @@ const PRECISE_ROUNDING: f64 = 1e-27;
 /// Points times degrees of a bicubic net, on which a step takes half a microsecond.
 const BICUBIC_WORK: usize = 96;
 
+/// What has come of a box, of one way to decide it, or of a leaf.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Step {
+    /// Nothing is left to do: it is dropped, its roots are offered, or what is left of it is on the stack.
+    Done,
+    /// This way does not decide it: the next one is tried.
+    Open,
+    /// `f64` cannot tell: the leaf is to be looked at in 32 digits, and what it has offered must be found again.
+    AskPrecise,
+}
+
 /// What is clipped.
 struct Clipping<'a> {
     index: u32,
@@ -98,7 +109,7 @@ impl Exact {
             leaf.has_pole && self.geometry.passes_pole(patch(), [query.o, query.d], CONTACT_LENGTH * leaf.contact);
         let clipping = Clipping { index, leaf, seen, departure, noise, at_pole };
         let before = [query.all.len(), query.all_rejected.len()];
-        if !self.clip_seen(query, &clipping) {
+        if self.clip_seen(query, &clipping) == Step::AskPrecise {
             // In a search for all, what it found is found again.
             query.all.truncate(before[0]);
             query.all_rejected.truncate(before[1]);
@@ -121,9 +132,9 @@ impl Exact {
         self.clip_seen(query, &Clipping { index, seen, ..clipping });
     }
 
-    /// Looks for every root in what is seen of a leaf. Returns `false` where `f64` cannot tell: what it offered must then be found again.
+    /// Looks for every root in what is seen of a leaf: [`Step::Done`] or [`Step::AskPrecise`].
     #[inline(always)]
-    fn clip_seen(&self, query: &mut Query, clipping: &Clipping<'_>) -> bool {
+    fn clip_seen(&self, query: &mut Query, clipping: &Clipping<'_>) -> Step {
         let leaf = clipping.leaf;
         let degree = leaf.degree;
         let mut net = Net::from_slice(&clipping.seen.net);
@@ -155,22 +166,22 @@ impl Exact {
                 query.undecided_from = query.undecided_from.min(node.near);
             } else if !is_behind {
                 query.budget = query.budget.saturating_sub(work);
-                if !self.clip_node(query, clipping, &node, &mut stack) {
-                    return false;
+                if self.clip_node(query, clipping, &node, &mut stack) == Step::AskPrecise {
+                    return Step::AskPrecise;
                 }
             }
-            let Some(next) = stack.pop() else { return true };
+            let Some(next) = stack.pop() else { return Step::Done };
             node = next;
         }
     }
 
-    /// Takes one step: drops a box, offers its root, or puts what is left of it on the stack; `false` where `f64` cannot tell.
+    /// Takes one step: drops a box, offers its root, or puts what is left of it on the stack; [`Step::Done`] or [`Step::AskPrecise`].
     #[inline(always)]
-    fn clip_node(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node, stack: &mut Vec<Node>) -> bool {
+    fn clip_node(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node, stack: &mut Vec<Node>) -> Step {
         let (degree, seen) = (clipping.leaf.degree, clipping.seen);
-        let Some(hull) = hull(&node.net, seen.homogeneous_margin) else { return true };
+        let Some(hull) = hull(&node.net, seen.homogeneous_margin) else { return Step::Done };
         if hull.near > query.t_max || hull.far < query.t_min - TANGENT {
-            return true;
+            return Step::Done;
         }
         // What the preconditioned hull leaves of the box, and its root where there is one at most.
         let mut keep = [[0.0, 1.0]; 2];
@@ -181,17 +192,19 @@ impl Exact {
             for k in 0..2 {
                 keep[k] = [keep[k][0] - y.slack[k], keep[k][1] + y.slack[k]];
                 if keep[k][0] > 1.0 || keep[k][1] < 0.0 {
-                    return true;
+                    return Step::Done;
                 }
                 keep[k] = [keep[k][0].max(0.0), keep[k][1].min(1.0)];
             }
-            if y.deviation < LARGEST_ROW_SUM_OF_BOX && self.take_single_root(query, clipping, node, &y, keep) {
-                return true;
+            if y.deviation < LARGEST_ROW_SUM_OF_BOX
+                && self.take_single_root(query, clipping, node, &y, keep) == Step::Done
+            {
+                return Step::Done;
             }
         }
         let small = size(&node.rect).into_iter().fold(0.0, f64::max);
-        if small <= TANGENCY_BOX && self.take_tangency(query, clipping, node) {
-            return true;
+        if small <= TANGENCY_BOX && self.take_tangency(query, clipping, node) == Step::Done {
+            return Step::Done;
         }
         // At a contact the Jacobian is singular: no box proves itself there, however small, so a small one is taken as it is. What `f64`
         // takes for one is looked at once more in 32 digits, until it is a point or nothing is left of it.
@@ -211,10 +224,11 @@ impl Exact {
         } else {
             halve(node, degree, &slopes, stack);
         }
-        true
+        Step::Done
     }
 
-    /// Offers or settles the root of a box with one at most, unless the ray leaves it; `false` when Newton's method finds none in the box.
+    /// Offers or settles the root of a box with one at most, unless the ray leaves it; [`Step::Open`] when Newton's method finds none in
+    /// the box.
     #[inline(always)]
     fn take_single_root(
         &self,
@@ -223,18 +237,18 @@ impl Exact {
         node: &Node,
         y: &Preconditioner,
         keep: [[f64; 2]; 2],
-    ) -> bool {
+    ) -> Step {
         let degree = clipping.leaf.degree;
         let start = keep.map(|[a, b]| 0.5 * (a + b));
         // The method may run off although a root is there; the box is then cut or halved like any other.
-        let Some([u, v]) = newton(&node.net, degree, start) else { return false };
+        let Some([u, v]) = newton(&node.net, degree, start) else { return Step::Open };
         // By direction: boxes may be as thin as rounding along one and long along the other.
         let room = y.slack.map(|slack| ROOT_ROUNDING + 2.0 * slack);
         let found = [u, v];
         // Beside the box: if it is a root of the leaf, another box holds it, and this one is cut until its hull
         // misses the ray.
         if (0..2).any(|k| !(-room[k]..=1.0 + room[k]).contains(&found[k])) {
-            return false;
+            return Step::Open;
         }
         let s = net::evaluate(&node.net, degree, u, v).s;
         let t = s[2] / s[3];
@@ -266,32 +280,33 @@ impl Exact {
                 self.offer(query, clipping.index, candidate);
             }
         }
-        true
+        Step::Done
     }
 
-    /// Offers the roots of a box where the ray touches a surface that bends, none or both; `false` where it cannot tell.
+    /// Offers the roots of a box where the ray touches a surface that bends, none or both; [`Step::Open`] where that does not tell.
     #[cold]
-    fn take_tangency(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node) -> bool {
+    fn take_tangency(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node) -> Step {
         // The square around the box, and somewhat more, is what is looked at.
         let side = size(&node.rect).into_iter().fold(0.0, f64::max);
         let is_around =
             |p: [f64; 2]| (0..2).all(|k| (p[k] - 0.5 * (node.rect[k][0] + node.rect[k][1])).abs() <= side);
         // Which of two roots a ray leaves that starts off them by rounding, 32 digits do not tell either.
         if clipping.at_pole || clipping.departure.is_some_and(is_around) || query.budget < TANGENCY_WORK {
-            return false;
+            return Step::Open;
         }
         let Some(roots) = tangency::roots(self, query, clipping.leaf, clipping.seen, node.rect) else {
-            return false;
+            return Step::Open;
         };
         for root in roots {
             self.offer_settled(query, clipping.index, &root, [settlement::LOOSE; 2]);
         }
-        true
+        Step::Done
     }
 
-    /// Offers the middle of a box that touches the ray within rounding, unless the ray leaves it; `false` where 32 digits may tell more.
+    /// Offers the middle of a box that touches the ray within rounding, unless the ray leaves it; [`Step::AskPrecise`] where 32 digits
+    /// may tell more.
     #[inline(always)]
-    fn take_contact(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node) -> bool {
+    fn take_contact(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node) -> Step {
         let s = net::evaluate(&node.net, clipping.leaf.degree, 0.5, 0.5).s;
         let [size_u, size_v] = size(&node.rect);
         let local = [node.rect[0][0] + 0.5 * size_u, node.rect[1][0] + 0.5 * size_v];
@@ -306,10 +321,10 @@ impl Exact {
                 let certainty = self.contact_certainty(clipping.leaf, local, query);
                 self.offer(query, clipping.index, Candidate { local, t, certainty, settled: None });
             }
-            return true;
+            return Step::Done;
         }
         // A box that touches in `f64` may be long, and hold another root beside the one that the ray leaves.
-        leaving && self.runs_along(query, clipping, node)
+        if leaving && self.runs_along(query, clipping, node) { Step::Done } else { Step::AskPrecise }
     }
 
     /// Whether the ray, as far as a box reaches, runs along the surface that it leaves: nowhere higher over it than what its start is off
