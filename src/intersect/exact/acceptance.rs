@@ -1,14 +1,15 @@
 //! Whether a root on a leaf is a crossing of the face: in range, not the point that the ray leaves, inside the trims.
 
-use super::edge_use::EdgeUse;
+use super::geometry::FaceRecord;
 use super::leaf::Leaf;
 use super::net;
-use super::patch::project;
+use super::patch::{Patch, project};
 use super::query::{Query, Root};
 use super::structure::Exact;
-use super::trim::Region;
+use super::trim::{Near, Region, Trim};
 use crate::intersect::Certainty;
 use crate::math::{Uv, Vector};
+use smallvec::SmallVec;
 
 /// A surface is regular where its normal is longer than this share of its longest derivative's square.
 const REGULAR: f64 = 1e-6;
@@ -57,8 +58,8 @@ impl Exact {
         query.accept(Root { t, leaf: index, local, certainty, near_trim, settled });
     }
 
-    /// Whether a root, in parameters of the leaf, lies inside the trims, and whether it is flagged as near one. Within the band of a shared
-    /// edge the side on which the ray passes that edge decides.
+    /// Whether a root, in parameters of the leaf, lies inside the trims, and whether it is flagged as near one. Near a shared edge the side
+    /// on which the ray passes that edge decides.
     fn trim_side(&self, query: &Query, leaf: &Leaf, local: [f64; 2]) -> (bool, bool) {
         let face = &self.geometry.faces[leaf.face as usize];
         let trim = &self.geometry.trims[face.trim as usize];
@@ -71,38 +72,51 @@ impl Exact {
         }
         let jet = net::evaluate(leaf.net(&self.geometry.nets), leaf.degree, local[0], local[1]);
         let (_, du, dv) = project(&jet);
-        // Distances across the ray, not along the surface: on a face that the ray grazes, the root strays from the edge by the
-        // gap over the sine, and still the edge must decide for both of its faces.
-        let scale = |d: usize| (leaf.rect[d][1] - leaf.rect[d][0]) * (patch.domain[d][1] - patch.domain[d][0]);
-        let across = |a: Vector, d: usize| (a - query.d * a.dot(query.d)) / scale(d);
-        let (su, sv) = (across(du, 0), across(dv, 1));
-        // The first fundamental form of the surface as the ray sees it: trims live in (u, v), bands are in mm.
-        let metric = [su.length_squared(), su.dot(sv), sv.length_squared()];
-        let mut place = trim.locate(uv, metric, face.flagging_distance);
-        let owner = |n: u32| -> &EdgeUse { &trim.uses[n as usize] };
-        place.near.retain(|n| n.distance <= self.geometry.flagging_distance(owner(n.owner).gap, &face.placement));
-        // Two radii: within the wider one, which grows with the file's gaps, a root is only flagged; within the
-        // band the shared edge decides.
-        let flagged = !place.near.is_empty();
-        place.near.retain(|n| n.distance <= face.deciding_distance);
-        if place.near.is_empty() {
-            return (place.inside, flagged);
+        let place = trim.locate(uv, seen_metric(query.d, leaf, patch, [du, dv]), face.flagging_distance);
+        let flagging = self.flagging_uses(face, trim, place.near);
+        if flagging.is_empty() {
+            return (place.inside, false);
         }
         let facing = du.cross(dv).dot(query.d);
-        // A ray that grazes a face beside its border meets it twice, before and behind where it bends away: the edge seen near both lies on
-        // the sheet of one, and of the other it says nothing.
-        place.near.retain(|n| self.geometry.facing(face, n.uv, query.d) * facing > 0.0);
-        if place.near.is_empty() {
-            return (place.inside, flagged);
+        let deciding = self.deciding_uses(face, flagging, query.d, facing);
+        if deciding.is_empty() {
+            return (place.inside, true);
         }
         let ray = [query.o, query.n1, query.n2];
-        let inside = match self.geometry.side_of_edges(face, trim, ray, facing, &place.near) {
+        let inside = match self.geometry.side_of_edges(face, trim, ray, facing, &deciding) {
             Some(inside) => inside,
             // Seams and poles bound nothing in space: what lies on them is part of the face.
-            None if place.near.iter().all(|n| owner(n.owner).edge.is_none()) => true,
+            None if deciding.iter().all(|n| trim.uses[n.owner as usize].edge.is_none()) => true,
             None => place.inside,
         };
         (inside, true)
+    }
+
+    /// Of uses near a root those that flag it: each as far as its own gap says.
+    #[inline]
+    fn flagging_uses(&self, face: &FaceRecord, trim: &Trim, mut near: SmallVec<[Near; 2]>) -> SmallVec<[Near; 2]> {
+        near.retain(|n| {
+            let gap = trim.uses[n.owner as usize].gap;
+            n.distance <= self.geometry.flagging_distance(gap, &face.placement)
+        });
+        near
+    }
+
+    /// Of uses that flag a root those whose edge decides on which side it lies: within the face's own distance, which a file's gaps do not
+    /// widen as far, and on the root's sheet. `facing` has the sign of `(Su × Sv) · d` at the root.
+    #[inline]
+    fn deciding_uses(
+        &self,
+        face: &FaceRecord,
+        mut near: SmallVec<[Near; 2]>,
+        d: Vector,
+        facing: f64,
+    ) -> SmallVec<[Near; 2]> {
+        near.retain(|n| n.distance <= face.deciding_distance);
+        // A ray that grazes a face beside its border meets it twice, before and behind where it bends away: the edge seen near both lies on
+        // the sheet of one, and of the other it says nothing.
+        near.retain(|n| self.geometry.facing(face, n.uv, d) * facing > 0.0);
+        near
     }
 
     /// The certainty of a contact: tangent where the surface is regular and the ray grazes it, else uncertified.
@@ -114,4 +128,17 @@ impl Exact {
         let sine = n.dot(query.d).abs() / n.length().max(f64::MIN_POSITIVE);
         if regular && sine < TANGENT_SINE { Certainty::Tangent } else { Certainty::Uncertified }
     }
+}
+
+/// The first fundamental form of a surface as a ray along `d` sees it, by parameters of the face: trims live in (u, v), distances from them
+/// are in mm. `tangents` are the derivatives by the leaf's parameters.
+///
+/// Distances across the ray, not along the surface: on a face that the ray grazes, the root strays from the edge by the gap over the sine,
+/// and still the edge must decide for both of its faces.
+#[inline]
+fn seen_metric(d: Vector, leaf: &Leaf, patch: &Patch, tangents: [Vector; 2]) -> [f64; 3] {
+    let scale = |k: usize| (leaf.rect[k][1] - leaf.rect[k][0]) * (patch.domain[k][1] - patch.domain[k][0]);
+    let across = |a: Vector, k: usize| (a - d * a.dot(d)) / scale(k);
+    let (su, sv) = (across(tangents[0], 0), across(tangents[1], 1));
+    [su.length_squared(), su.dot(sv), sv.length_squared()]
 }
