@@ -143,7 +143,8 @@ impl Geometry {
     }
 
     /// Whether a ray, in the part's coordinates, through a vertex falls into one of the face's sectors there; `None` when it passes no
-    /// vertex, or runs along an edge of one.
+    /// vertex, or one with a corner that tells nothing: the ray runs along an edge of it, or nothing else bounds the face there. What
+    /// other corners told is dropped then, and the nearest edge is left to decide.
     ///
     /// Directions are compared, never subtracted: whatever their rounding, each falls into exactly one of the sectors about a
     /// vertex.
@@ -171,6 +172,7 @@ impl Geometry {
                 if !(vertex[0].hypot(vertex[1]) <= radius.max(rounding)) {
                     continue;
                 }
+                // Each `?` ends the search and drops `found`: the sectors of some corners alone do not divide what is about the vertex.
                 let other = edge_use::next_bounding_use(&trim.uses, owner, forward)?;
                 // Away from the vertex along the loop, and back from it.
                 let (outgoing, incoming) = if forward { (other, owner) } else { (owner, other) };
