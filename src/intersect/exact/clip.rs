@@ -243,11 +243,11 @@ impl Exact {
         // The method may run off although a root is there; the box is then cut or halved like any other.
         let Some([u, v]) = newton(&node.net, degree, start) else { return Step::Open };
         // By direction: boxes may be as thin as rounding along one and long along the other.
-        let room = y.slack.map(|slack| ROOT_ROUNDING + 2.0 * slack);
+        let box_margin = y.slack.map(|slack| ROOT_ROUNDING + 2.0 * slack);
         let found = [u, v];
         // Beside the box: if it is a root of the leaf, another box holds it, and this one is cut until its hull
         // misses the ray.
-        if (0..2).any(|k| !(-room[k]..=1.0 + room[k]).contains(&found[k])) {
+        if (0..2).any(|k| !(-box_margin[k]..=1.0 + box_margin[k]).contains(&found[k])) {
             return Step::Open;
         }
         let s = net::evaluate(&node.net, degree, u, v).s;
@@ -261,14 +261,14 @@ impl Exact {
         // find a root on their border both.
         let is_departure = |p: [f64; 2]| {
             let is_close =
-                (0..2).all(|k| (p[k] - local[k]).abs() <= sizes[k] * (room[k] + moved[k]) + SAME_PARAMETER);
+                (0..2).all(|k| (p[k] - local[k]).abs() <= sizes[k] * (box_margin[k] + moved[k]) + SAME_PARAMETER);
             is_close || (0..2).all(|k| p[k] >= node.rect[k][0] && p[k] <= node.rect[k][1])
         };
         let leaving =
             clipping.departure.is_some_and(is_departure) && query.departure.is_some_and(|own| own.is_root_at(t));
         if !leaving {
             let candidate = Candidate { local, t, certainty: Certainty::Certified, settled: None };
-            let margin = [0, 1].map(|k: usize| room[k] * sizes[k]);
+            let margin = [0, 1].map(|k: usize| box_margin[k] * sizes[k]);
             let ill_scaled = self.linearizations[clipping.index as usize].ill_scaled;
             if clipping.seen.precise {
                 self.settle(query, clipping.index, candidate, [settlement::LOOSE; 2]);

@@ -75,10 +75,10 @@ impl RaySlabs {
         self.start = near;
         self.misses = near > far;
         // In single precision the point is rounded outwards in every axis: a box that the true ray meets is never missed.
-        let slack = 4.0 * f64::EPSILON * (reach + near.abs());
+        let rounding = 4.0 * f64::EPSILON * (reach + near.abs());
         for k in 0..3 {
             let at = o[k] - tree.center[k] + d[k] * near;
-            let (up, down) = (((at + slack) as f32).next_up(), ((at - slack) as f32).next_down());
+            let (up, down) = (((at + rounding) as f32).next_up(), ((at - rounding) as f32).next_down());
             (self.enter[k], self.leave[k]) = if self.back[k] == 0 { (up, down) } else { (down, up) };
         }
         self.end_at(ray.t_max);

@@ -131,24 +131,24 @@ impl Bend {
         let spread = |e: [f64; 2], x: [f64; 2]| e[0].abs() * x[0] + e[1].abs() * x[1];
         // A derivative is n times a difference of two points, a second one n² of four at most.
         let n = f64::from(degree[0].max(degree[1]));
-        let noise_along = spread(along, margin);
-        let noise_across = spread(across, margin);
-        let (first_noise, second_noise) = (2.0 * n, 4.0 * n * n);
+        let margin_along = spread(along, margin);
+        let margin_across = spread(across, margin);
+        let (first_factor, second_factor) = (2.0 * n, 4.0 * n * n);
 
-        let h_q = length[q] - spread(along, radii[q]) - first_noise * noise_along;
+        let h_q = length[q] - spread(along, radii[q]) - first_factor * margin_along;
         if !(h_q > 0.5 * length[q]) {
             return None;
         }
-        let (h_p, r) = (part(along, columns[p]), spread(along, radii[p]) + first_noise * noise_along);
+        let (h_p, r) = (part(along, columns[p]), spread(along, radii[p]) + first_factor * margin_along);
         let most_h_q = 2.0 * length[q] - h_q;
         let ends = [h_p - r, h_p + r].map(|x| [-x / h_q, -x / most_h_q]);
         let slope = ends.as_flattened().iter().fold([f64::INFINITY, f64::NEG_INFINITY], |a, &x| grown(a, x));
-        let lambda = (spread(across, radii[q]) + first_noise * noise_across) / h_q;
+        let lambda = (spread(across, radii[q]) + first_factor * margin_across) / h_q;
 
-        let second = |e: [f64; 2], noise: f64| {
-            second_derivatives(net, degree, [p, q], |x| e[0] * x[0] + e[1] * x[1], second_noise * noise)
+        let second = |e: [f64; 2], margin: f64| {
+            second_derivatives(net, degree, [p, q], |x| e[0] * x[0] + e[1] * x[1], second_factor * margin)
         };
-        let (g2, h2) = (second(across, noise_across), second(along, noise_along));
+        let (g2, h2) = (second(across, margin_across), second(along, margin_along));
         let steepest = slope[0].abs().max(slope[1].abs());
         let size = |x: Range| x[0].abs().max(x[1].abs());
         let h_bend = size(h2[0]) + 2.0 * size(h2[1]) * steepest + size(h2[2]) * steepest * steepest;
@@ -158,8 +158,9 @@ impl Bend {
         }
         let mixed = product(g2[1], slope);
         let square = product(g2[2], squared(slope));
-        let slack = lambda * h_bend;
-        let range = [g2[0][0] + 2.0 * mixed[0] + square[0] - slack, g2[0][1] + 2.0 * mixed[1] + square[1] + slack];
+        let h_part = lambda * h_bend;
+        let range =
+            [g2[0][0] + 2.0 * mixed[0] + square[0] - h_part, g2[0][1] + 2.0 * mixed[1] + square[1] + h_part];
         // The side on which φ is convex.
         let (range, across) =
             if range[1] < 0.0 { ([-range[1], -range[0]], across.map(|x| -x)) } else { (range, across) };
@@ -224,13 +225,13 @@ fn squared([low, high]: Range) -> Range {
     [least * least, most * most]
 }
 
-/// Ranges over the net of the second derivatives (pp, pq, qq) of a component of it, widened by `noise`; zero for those of degree one.
+/// Ranges over the net of the second derivatives (pp, pq, qq) of a component of it, widened by `margin`; zero for those of degree one.
 fn second_derivatives(
     net: &[V4],
     degree: [u8; 2],
     [p, q]: [usize; 2],
     component: impl Fn(&V4) -> f64,
-    noise: f64,
+    margin: f64,
 ) -> [Range; 3] {
     let counts = degree.map(usize::from);
     let at = |i: usize, j: usize| component(&net[i * (counts[1] + 1) + j]);
@@ -251,7 +252,7 @@ fn second_derivatives(
     }
     let [n, m] = counts.map(|n| n as f64);
     // Of degree one there is no second difference, and the derivative is zero.
-    let scaled = |x: Range, k: f64| if x[0] > x[1] { [0.0; 2] } else { [k * x[0] - noise, k * x[1] + noise] };
+    let scaled = |x: Range, k: f64| if x[0] > x[1] { [0.0; 2] } else { [k * x[0] - margin, k * x[1] + margin] };
     let own = [scaled(uu, n * (n - 1.0)), scaled(vv, m * (m - 1.0))];
     [own[p], scaled(uv, n * m), own[q]]
 }

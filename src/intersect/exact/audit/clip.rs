@@ -147,14 +147,15 @@ impl<'a> PatchClipping<'a> {
             // Rounded by the root's own condition: a unit across the ray moves it by `moves`.
         });
         // Boxes that share a border both take a root on it; at the end of the surface rounding decides nothing.
-        let slop = around.map(|[a, b]| BESIDE + BESIDE_ROUNDING * self.rounding * moves * (b - a));
+        let margin = around.map(|[a, b]| BESIDE + BESIDE_ROUNDING * self.rounding * moves * (b - a));
         let within = |k: usize| {
             let [lo, hi] = net.domain[k];
-            at[k] >= lo - slop[k] && at[k] <= hi + slop[k]
+            at[k] >= lo - margin[k] && at[k] <= hi + margin[k]
         };
         if within(0) && within(1) {
             let m = self.whole.point(Uv::from(at));
-            let at_end = |k: usize| self.ends[k][0] && at[k] < slop[k] || self.ends[k][1] && at[k] > 1.0 - slop[k];
+            let at_end =
+                |k: usize| self.ends[k][0] && at[k] < margin[k] || self.ends[k][1] && at[k] > 1.0 - margin[k];
             self.push(m, at, at_end(0) || at_end(1), out);
         }
         true
