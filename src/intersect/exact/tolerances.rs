@@ -2,6 +2,21 @@
 //!
 //! Where nothing else is said a number is a share of a leaf's parameter range, which is the unit square. Bounds of rounding are
 //! counted in half ulps where they are used, in units of [`ROUND`].
+//!
+//! Bounds of error have one name each, from what they are made of to what comes of them:
+//!
+//! | name | what is off by no more | unit | made by |
+//! |---|---|---|---|
+//! | `rounding` | one value, by its own rounding: a patch's points, a ray's origin | mm | `Patch`, `DeparturePoint`, locals |
+//! | `slop` | a leaf's control points, by all that made them | mm | `leaf::describe` |
+//! | `noise` | a leaf's coordinates across a ray: `slop`, and the ray's part | mm | `Exact::noise`; `still_noise` without the ray |
+//! | `homogeneous_margin` | the same of a net under clipping: `noise`, and what halvings round | mm × weight | `clip_hull` |
+//! | `margin`, `margins` | a root's place, by both directions together and by each | share of a leaf | `Exact::test_leaf`, clipping |
+//! | `slack` | a root's place in a box that is clipped | share of a box | `clip_hull::precondition` |
+//! | `box_margin` | the same, twice over, and where Newton's method ends | share of a box | `Exact::take_single_root` |
+//!
+//! What takes a homogeneous margin, as hulls do, calls it `margin` and says its unit. In `shared_edge` a `rounding` is in units of the
+//! part; [`super::audit`] has bounds of its own.
 
 /// Half an ulp of 1: the relative error of one rounded operation.
 pub(super) const ROUND: f64 = 0.5 * f64::EPSILON;
