@@ -27,7 +27,7 @@ use crate::math::simd::{self, Instructions, Kernel};
 const BEYOND_UNIT: f64 = 1e-9;
 /// Row sums below this leave at most one root, and Newton's method a tenth of each error at worst; what lies above is halved.
 const LARGEST_ROW_SUM_OF_BOX: f64 = 0.9;
-/// How far beyond its box a root counts beside twice the margin: Newton's method ends within 1e-14.
+/// How far beyond its box a root counts beside twice the slack: Newton's method ends within 1e-14.
 const ROOT_ROUNDING: f64 = 1e-12;
 /// Boxes of this size are a point to Newton's method.
 const POINT_BOX: f64 = 1e-7;
