@@ -14,8 +14,11 @@
 //! 7. the mesh is scaled by a power of two to a size of about a hundred, for such absolute limits let rays pass through a mesh
 //!    of 1e-4 mm.
 //!
+//! Boxes that are many times the same are one primitive (`bvh_tree`), cured or not: obvhs would not end over ten thousands of them.
+//!
 //! Guarantee when cured: bit for bit the hits of the octree. Weakness: slower by what f64 leaves cost.
 
+use super::bvh_tree::{Bounded, EqualBoxes, MemberRanges, Tree, wide_or_binary};
 use super::facet::{FacetHit, FacetRay, Nearest, Surroundings};
 use super::facet_triangles::TriangleCode;
 use super::{Cost, Footprint, Hit, Intersector, NormalMode, normals};
@@ -23,14 +26,12 @@ use crate::math::{Aabb, Point, Ray, Vector};
 use crate::mesh::FacetMesh;
 use glam::{UVec2, Vec3A};
 use obvhs::aabb::Aabb as Box32;
-use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::bvh2::{Bvh2, builder::build_bvh2, builder::build_bvh2_from_tris};
-use obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris, bvh2_to_cwbvh::bvh2_to_cwbvh};
-use obvhs::ploc::PlocBuilder;
+use obvhs::bvh2::builder::{build_bvh2, build_bvh2_from_tris};
+use obvhs::cwbvh::builder::build_cwbvh_from_tris;
 use obvhs::ray::{Ray as Ray32, RayHit};
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
-use obvhs::{Boundable, BvhBuildParams, traverse};
+use obvhs::{BvhBuildParams, traverse};
 use std::time::{Duration, Instant};
 
 /// Size of a cured tree in its own units: that of the lamps on which the absolute limits of obvhs were seen to be harmless.
@@ -110,8 +111,10 @@ pub struct Bvh<'m> {
     normals: NormalMode,
     tree: Tree,
     leaves: Leaves,
-    /// The triangle of each leaf primitive.
+    /// The triangles of all leaf primitives.
     codes: Vec<TriangleCode>,
+    /// Which of them are those of a leaf primitive.
+    members: MemberRanges,
     /// Middle of the mesh, mm, about which a cured tree is built.
     center: Point,
     /// Around the mesh, grown by the room around boxes, mm.
@@ -121,26 +124,10 @@ pub struct Bvh<'m> {
     build_seconds: f64,
 }
 
-/// The tree of obvhs, binary or of eight.
-enum Tree {
-    Empty,
-    Binary(Bvh2),
-    Wide(CwBvh),
-}
-
 /// What is tested at a leaf, in the tree's order.
 enum Leaves {
     Shipped(Vec<RtTriangle>),
     Cured(Vec<[Point; 4]>),
-}
-
-/// A box as obvhs asks for it.
-struct Bounded(Box32);
-
-impl Boundable for Bounded {
-    fn aabb(&self) -> Box32 {
-        self.0
-    }
 }
 
 impl<'m> Bvh<'m> {
@@ -157,30 +144,29 @@ impl<'m> Bvh<'m> {
             Quality::Medium => BvhBuildParams::medium_build(),
             Quality::VerySlow => BvhBuildParams::very_slow_build(),
         };
-        let mut core = Duration::ZERO;
-        let tree = if codes.is_empty() {
-            Tree::Empty
-        } else if settings.cured {
+        let boxes: Vec<Bounded> = if settings.cured {
             let pad = size * BOX_ROOM;
-            let boxes: Vec<Bounded> = codes.iter().map(|&c| padded_box(mesh, c, center, pad, scale)).collect();
-            match settings.kind {
-                Kind::Bvh2 => Tree::Binary(build_bvh2(&boxes, params, &mut core)),
-                Kind::CwBvh => wide_or_binary(&boxes, &params),
-            }
+            codes.iter().map(|&c| padded_box(mesh, c, center, pad, scale)).collect()
         } else {
-            let triangles: Vec<Triangle> = codes.iter().map(|&c| triangle32(mesh, c)).collect();
-            match settings.kind {
-                Kind::Bvh2 => Tree::Binary(build_bvh2_from_tris(&triangles, params, &mut core)),
-                Kind::CwBvh => Tree::Wide(build_cwbvh_from_tris(&triangles, params, &mut core)),
+            codes.iter().map(|&c| Bounded(triangle32(mesh, c).aabb())).collect()
+        };
+        let equal = EqualBoxes::find(&boxes);
+        let tree = match &equal {
+            None => build_tree(mesh, settings, params, &codes, &boxes),
+            // The parts of a triangle that is split hold no other one.
+            Some(equal) => {
+                let params = BvhBuildParams { pre_split: false, ..params };
+                build_tree(mesh, settings, params, &equal.first_of_each(&codes), &equal.first_of_each(&boxes))
             }
         };
         // Leaves name places in the tree's own order of triangles.
-        let order: &[u32] = match &tree {
-            Tree::Empty => &[],
-            Tree::Binary(b) => &b.primitive_indices,
-            Tree::Wide(b) => &b.primitive_indices,
+        let (codes, members): (Vec<TriangleCode>, MemberRanges) = match &equal {
+            None => (tree.order().iter().map(|&i| codes[i as usize]).collect(), MemberRanges::default()),
+            Some(equal) => {
+                let (places, members) = equal.in_order(tree.order());
+                (places.into_iter().map(|i| codes[i as usize]).collect(), members)
+            }
         };
-        let codes: Vec<TriangleCode> = order.iter().map(|&i| codes[i as usize]).collect();
         let leaves = if settings.cured {
             Leaves::Cured(codes.iter().map(|&c| mesh.corners(c.facet() as usize)).collect())
         } else {
@@ -188,7 +174,8 @@ impl<'m> Bvh<'m> {
         };
         let bounds = bounds.grown(size * BOX_ROOM);
         let build_seconds = started.elapsed().as_secs_f64();
-        Self { surroundings, normals: settings.normals, tree, leaves, codes, center, bounds, scale, build_seconds }
+        let normals = settings.normals;
+        Self { surroundings, normals, tree, leaves, codes, members, center, bounds, scale, build_seconds }
     }
 
     /// Finds the nearest hit, without its normal, and counts the ray; `None` for a miss.
@@ -211,12 +198,15 @@ impl<'m> Bvh<'m> {
             return None;
         }
         let ray32 = Ray32::new(origin, direction, ray.t_min as f32, t_max);
-        let (found, t) = self.walk(ray32, cost, |ray, id| {
-            // As shipped there are no departures; the facet that is left is passed over, or each such ray would hit
-            // its own start.
+        // As shipped there are no departures; the facet that is left is passed over, or each such ray would hit its own start.
+        let distance = |ray: &Ray32, id: usize| {
             if own == Some(self.codes[id].facet()) { f32::INFINITY } else { triangles[id].intersect(ray) }
+        };
+        let (found, t) = self.walk(ray32, cost, |ray, primitive| {
+            self.members.of(primitive).map(|id| distance(ray, id)).fold(f32::INFINITY, f32::min)
         });
-        let found = found?;
+        // Of the primitive's members, mostly one, that which was hit.
+        let found = self.members.of(found?).min_by(|&a, &b| distance(&ray32, a).total_cmp(&distance(&ray32, b)))?;
         // Their weights are those of the second and third corner for edges v0 − v1 and v2 − v0.
         let weights = triangles[found].compute_barycentric(&ray32);
         Some(self.codes[found].hit(f64::from(t), [weights.x, weights.y].map(f64::from)))
@@ -249,15 +239,17 @@ impl<'m> Bvh<'m> {
                 .to_array()
                 .map(|d| if d.abs() < 1.0 / LARGEST_INVERSE { LARGEST_INVERSE.copysign(d) } else { 1.0 / d }),
         );
-        self.walk(ray32, cost, |_, id| {
+        self.walk(ray32, cost, |_, primitive| {
             let before = best.t;
-            facet_ray.test(
-                self.codes[id].facet(),
-                1 << u32::from(self.codes[id].is_second()),
-                corners[id].each_ref(),
-                &self.surroundings,
-                &mut best,
-            );
+            for id in self.members.of(primitive) {
+                facet_ray.test(
+                    self.codes[id].facet(),
+                    1 << u32::from(self.codes[id].is_second()),
+                    corners[id].each_ref(),
+                    &self.surroundings,
+                    &mut best,
+                );
+            }
             // Only a nearer hit may shorten the ray; infinity leaves it as it is.
             if best.t < before { far(best.t) } else { f32::INFINITY }
         });
@@ -277,7 +269,7 @@ impl<'m> Bvh<'m> {
             Tree::Binary(tree) => {
                 let mut hit = RayHit::none();
                 tree.ray_traverse(ray, &mut hit, |ray, id| {
-                    cost.tests += 1;
+                    cost.tests += self.members.of(id).len() as u64;
                     leaf(ray, id)
                 });
                 ((hit.primitive_id != u32::MAX).then_some(hit.primitive_id as usize), hit.t)
@@ -297,7 +289,7 @@ impl<'m> Bvh<'m> {
                         node.intersect_ray(&ray, state.oct_inv4)
                     },
                     {
-                        cost.tests += 1;
+                        cost.tests += self.members.of(state.primitive_id as usize).len() as u64;
                         let t = leaf(&ray, state.primitive_id as usize);
                         if t < ray.tmax {
                             found = Some(state.primitive_id as usize);
@@ -317,42 +309,38 @@ impl Intersector for Bvh<'_> {
     }
 
     fn footprint(&self) -> Footprint {
-        let tree = match &self.tree {
-            Tree::Empty => 0,
-            Tree::Binary(b) => size_of_val(&*b.nodes) + size_of_val(&*b.primitive_indices),
-            Tree::Wide(b) => size_of_val(&*b.nodes) + size_of_val(&*b.primitive_indices),
-        };
         let leaves = match &self.leaves {
             Leaves::Shipped(l) => size_of_val(&**l),
             Leaves::Cured(l) => size_of_val(&**l),
         };
-        let bytes = tree + leaves + size_of_val(&*self.codes);
+        let bytes = self.tree.bytes() + leaves + size_of_val(&*self.codes) + self.members.bytes();
         Footprint { bytes, primitives: self.surroundings.mesh.facets.len(), build_seconds: self.build_seconds }
     }
 }
 
-/// Builds a wide tree over boxes, at least one, by the steps of `obvhs::cwbvh::builder::build_cwbvh`; where it is too deep for the 32
-/// places of its stack, as over many coincident facets, returns the binary tree it comes from.
-fn wide_or_binary(boxes: &[Bounded], params: &BvhBuildParams) -> Tree {
-    let all = (0..boxes.len() as u32).collect();
-    let (distance, threshold) = (params.ploc_search_distance, params.search_depth_threshold);
-    let mut binary =
-        PlocBuilder::with_capacity(boxes.len()).build(distance, boxes, all, params.sort_precision, threshold);
-    ReinsertionOptimizer::default().run(&mut binary, params.reinsertion_batch_ratio, None);
-    let wide = bvh2_to_cwbvh(&binary, params.max_prims_per_leaf.clamp(1, 3), true, false);
-    if depth(&wide) < 32 { Tree::Wide(wide) } else { Tree::Binary(binary) }
-}
-
-/// Levels of nodes below each other, the root's included: 1 for a root alone.
-fn depth(tree: &CwBvh) -> u32 {
-    let mut deepest = 0;
-    let mut open = vec![(0, 1)];
-    while let Some((index, depth)) = open.pop() {
-        deepest = deepest.max(depth);
-        let Some(node) = tree.nodes.get(index as usize) else { continue };
-        open.extend((0..node.imask.count_ones()).map(|k| (node.child_base_idx + k, depth + 1)));
+/// Builds the tree over triangles with their boxes; it names them by their places in these lists.
+fn build_tree(
+    mesh: &FacetMesh,
+    settings: &Settings,
+    params: BvhBuildParams,
+    codes: &[TriangleCode],
+    boxes: &[Bounded],
+) -> Tree {
+    let mut core = Duration::ZERO;
+    if codes.is_empty() {
+        return Tree::Empty;
     }
-    deepest
+    if settings.cured {
+        return match settings.kind {
+            Kind::Bvh2 => Tree::Binary(build_bvh2(boxes, params, &mut core)),
+            Kind::CwBvh => wide_or_binary(boxes, &params),
+        };
+    }
+    let triangles: Vec<Triangle> = codes.iter().map(|&c| triangle32(mesh, c)).collect();
+    match settings.kind {
+        Kind::Bvh2 => Tree::Binary(build_bvh2_from_tris(&triangles, params, &mut core)),
+        Kind::CwBvh => Tree::Wide(build_cwbvh_from_tris(&triangles, params, &mut core)),
+    }
 }
 
 /// The triangle in f32, in the mesh's own coordinates.

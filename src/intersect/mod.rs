@@ -3,6 +3,7 @@
 //! All intersectors answer through [`Intersector`]; all of them count what they do to find hits in a [`Cost`].
 
 pub mod bvh;
+mod bvh_tree;
 #[cfg(feature = "contenders")]
 pub mod contenders;
 mod corner_normals;

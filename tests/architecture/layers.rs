@@ -331,6 +331,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "corner_normals_avx2",
             "cubic_patch",
             "normals",
+            "bvh_tree",
             "bvh",
             "contenders",
             "octree",
