@@ -2,6 +2,7 @@
 
 use super::border::edge_chords::EdgeSide;
 use super::border::edges::{self, Division, OwnDivision};
+use super::extent;
 use super::face::{self, FaceInput, Unmeshed};
 use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
@@ -29,7 +30,7 @@ pub(super) struct PartMesh {
     pub(super) shared: Vec<Point>,
     /// `None` for a face that could not be meshed or has no usable surface.
     pub(super) faces: Vec<Option<FaceMesh>>,
-    /// Why faces, by their place in the part, exceeded a limit: too many facets or too much work. Other failures are not in it.
+    /// Why faces, by their place in the part, have no facets: too many, too much work, or no area. Other failures are not in it.
     pub(super) causes: FxHashMap<usize, FailureCause>,
     /// What each face has given up for the sake of others.
     pub(super) taken: Vec<TakenChords>,
@@ -98,8 +99,11 @@ fn mesh_with_rounds(
 ) -> (PartMesh, bool) {
     let part = placed.part;
     let faces: Vec<&Face> = part.shells.iter().flat_map(|s| &s.faces).collect();
-    let laid_out =
-        |(k, face)| (face, if too_large(k).is_some() { None } else { placed.surface(settings, k, face) });
+    let without_area = extent::lone_faces_without_area(&faces);
+    let laid_out = |(k, face)| {
+        let is_left_out = too_large(k).is_some() || without_area.binary_search(&k).is_ok();
+        (face, if is_left_out { None } else { placed.surface(settings, k, face) })
+    };
     let faces: Vec<(&Face, Option<FaceSurface<'_>>)> = faces.into_par_iter().enumerate().map(laid_out).collect();
     let known: Vec<_> = faces.iter().filter_map(|(face, surface)| Some((*face, surface.as_ref()?))).collect();
     let sides = edge_sides(part, &known);
@@ -160,7 +164,7 @@ fn mesh_with_rounds(
     fill_crossing_borders(&mut meshes, input);
     let again = |k: usize, taken: &TakenChords| mesh_face(&FaceInput { taken, ..input(k)? });
     let taken = take_doubled_chords(part, &mut meshes, &mut budget, again);
-    let causes = exceeded_limits(&faces, too_large);
+    let causes = failure_causes(&faces, &meshes, too_large);
     let mesh = PartMesh { divisions, shared, faces: meshes, causes, taken, meetings };
     (with_coincident_vertices_joined(mesh), asked)
 }
@@ -215,16 +219,19 @@ fn take_doubled_chords(
     taken
 }
 
-/// Returns why faces, by their places, were left without facets: too many cells, of which `too_large` knows the number, or too many steps
-/// of proofs.
-fn exceeded_limits(
+/// Returns why faces, by their places, were left without facets: too many cells, of which `too_large` knows the number, too many steps of
+/// proofs, or no area.
+fn failure_causes(
     faces: &[(&Face, Option<FaceSurface<'_>>)],
+    meshes: &[Option<FaceMesh>],
     too_large: impl Fn(usize) -> Option<f64>,
 ) -> FxHashMap<usize, FailureCause> {
-    let cause = |(k, (_, surface)): (usize, &(&Face, Option<FaceSurface<'_>>))| {
+    let cause = |(k, (face, surface)): (usize, &(&Face, Option<FaceSurface<'_>>))| {
         let over_steps = surface.as_ref().is_some_and(|s| s.steps.are_too_many());
         let cells = too_large(k).map(FailureCause::TooManyFacets);
-        Some((k, cells.or(over_steps.then_some(FailureCause::TooManySteps))?))
+        let limit = cells.or(over_steps.then_some(FailureCause::TooManySteps));
+        let has_no_area = || meshes[k].is_none() && extent::has_no_area(&face.surface);
+        Some((k, limit.or_else(|| has_no_area().then_some(FailureCause::NoArea))?))
     };
     faces.iter().enumerate().filter_map(cause).collect()
 }
@@ -322,7 +329,9 @@ pub(super) fn mesh_face(input: &FaceInput<'_, '_>) -> Option<FaceMesh> {
         return None;
     }
     let finite = uses().all(|u| u.uv.points.iter().all(|p| p.is_finite()));
-    let whole = if finite { face::mesh(input) } else { Err(Unmeshed::Empty) };
+    // Inside of a point there is nothing but rounding; its border closes what is beside it.
+    let is_meshed = finite && !extent::is_point(&face.surface);
+    let whole = if is_meshed { face::mesh(input) } else { Err(Unmeshed::Empty) };
     let (how, meetings) = match whole {
         Ok(mesh) => return Some(mesh),
         Err(Unmeshed::Empty) => (Repair::BorderOnly, vec![]),

@@ -92,7 +92,8 @@ impl<'a> FaceSurface<'a> {
         let pole_size = if poles.iter().flatten().any(|&p| p) { least } else { 0.0 };
         let affine = is_affine(surface, rounding);
         // A ball or ring within its tolerance would be a point: all its triangles had two corners in one place.
-        let most = CLOSED_TOLERANCE * size;
+        // Within what rounds them points are one.
+        let most = (CLOSED_TOLERANCE * size).max(rounding);
         let closed = [0, 1].map(|d| is_closed(surface, d, least));
         let ends = |d: usize| poles[d] == [true; 2] || closed[d];
         // Closed in both directions, or from pole to pole: only then can a large tolerance leave nothing of the

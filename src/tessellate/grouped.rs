@@ -1,10 +1,11 @@
 //! Facets of a model whose parts that are placed often have coordinates of their own: each group is meshed by itself, once.
 
+use super::extent::has_no_area;
 use super::settings::{FaceSelector, Settings};
 use super::tessellation::Tessellation;
 use crate::math::{Aabb, FaceId, Point, Uv, Vector};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
-use crate::model::{Instancing, Model, Placement};
+use crate::model::{Instancing, Model, PlacedFace, Placement};
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -48,13 +49,19 @@ impl GroupedFacets {
         self.counted().map(|(mesh, count)| mesh.facets.len() * count).sum()
     }
 
-    /// Returns how many faces of the scene have no facet, each counted at all places of its group; `model` is the one that was meshed.
+    /// Returns how many faces of the scene have no facet though they have an area, each counted at all places of its group; `model` is the
+    /// one that was meshed.
     pub fn faces_without_facets(&self, model: &Model) -> usize {
         let models = self.instancing.as_ref().map_or(std::slice::from_ref(model), |i| &i.groups);
         let bare = |(model, (mesh, count)): (&Model, (&FacetMesh, usize))| {
             let mut is_bare = vec![true; model.placed_face_count()];
             mesh.facets.iter().for_each(|f| is_bare[f.face.index()] = false);
-            is_bare.into_iter().filter(|bare| *bare).count() * count
+            if !is_bare.contains(&true) {
+                return 0;
+            }
+            let has_area = |placed: &PlacedFace| placed.face.is_none_or(|face| !has_no_area(&face.surface));
+            let faces = model.placed_faces().zip(is_bare);
+            faces.filter(|(placed, bare)| *bare && has_area(placed)).count() * count
         };
         models.iter().zip(self.counted()).map(bare).sum()
     }

@@ -26,6 +26,7 @@ mod detours;
 mod emission;
 mod evaluation;
 mod expected_cells;
+mod extent;
 mod face;
 mod face_mesh;
 mod face_surface;

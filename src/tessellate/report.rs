@@ -62,6 +62,13 @@ pub struct Report {
     pub peak_bytes: Option<u64>,
 }
 
+impl Report {
+    /// Returns how many faces have no facets though they have an area: light passes where they are.
+    pub fn missing_faces(&self) -> usize {
+        self.failed.iter().filter(|f| f.cause != FailureCause::NoArea).count()
+    }
+}
+
 /// Whether there is nothing to report.
 fn is_zero(count: &usize) -> bool {
     *count == 0
@@ -157,6 +164,8 @@ pub enum FailureCause {
     TooManyFacets(f64),
     /// Its surface is so wild that the proofs of its facets took more steps than any face may take.
     TooManySteps,
+    /// All of its surface is one point or one line, to the rounding of its coordinates: nothing is missing.
+    NoArea,
 }
 
 impl std::fmt::Display for FailureCause {
@@ -168,6 +177,7 @@ impl std::fmt::Display for FailureCause {
                 "it needs more than {count:.0e} facets, with which the model would have more than it may: ask for a larger tolerance, or check the file's unit"
             ),
             Self::TooManySteps => f.write_str("its surface is too wild to be proved: ask for a larger tolerance"),
+            Self::NoArea => f.write_str("it has no area: all of it is one point or one line"),
         }
     }
 }

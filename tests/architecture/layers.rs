@@ -596,6 +596,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
     (
         "tessellate",
         &[
+            "extent",
             "meetings",
             "nodes",
             "triangle_frame",

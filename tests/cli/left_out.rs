@@ -1,6 +1,6 @@
 //! Parts that a scene leaves out of its model, with the real binary.
 
-use crate::files::fixture;
+use crate::files::{fixture, part21};
 use crate::support::lampyris_in;
 use serde_json::Value;
 use std::fs;
@@ -115,4 +115,36 @@ fn a_selector_that_means_nothing_is_refused_with_what_there_is() {
         let (code, _, err) = lampyris_in(path, &["trace", "s.toml", "-o", "out"]);
         assert!(code == 2 && err.contains(message) && err.contains("s.toml:5"), "{without}: {code} {err}");
     }
+}
+
+/// A square and the tip of a wing as OpenVSP writes it, all four corners in one point: nothing that has an area is missing.
+#[test]
+fn a_face_without_an_area_is_told_and_is_no_reason_to_fail() {
+    let folder = tempfile::tempdir().unwrap();
+    let patch = |id: u32, points: &str| {
+        format!(
+            "#{id}=B_SPLINE_SURFACE_WITH_KNOTS('',1,1,({points}),.UNSPECIFIED.,.F.,.F.,.F.,(2,2),(2,2),(0.,1.),(0.,1.),.UNSPECIFIED.);\n"
+        )
+    };
+    let entities = "#1=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n\
+        #2=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#1))REPRESENTATION_CONTEXT('',''));\n\
+        #3=GEOMETRIC_SET('',(#10,#11));\n\
+        #4=GEOMETRICALLY_BOUNDED_SURFACE_SHAPE_REPRESENTATION('',(#3),#2);\n\
+        #20=CARTESIAN_POINT('',(4985.8,0.,3340.6));\n#21=CARTESIAN_POINT('',(4995.8,0.,3340.6));\n\
+        #22=CARTESIAN_POINT('',(4985.8,10.,3340.6));\n#23=CARTESIAN_POINT('',(4995.8,10.,3340.6));\n"
+        .to_owned()
+        + &patch(10, "(#20,#20),(#20,#20)")
+        + &patch(11, "(#20,#21),(#22,#23)");
+    fs::write(folder.path().join("tip.stp"), part21(&entities)).unwrap();
+    let (code, _, err) = lampyris_in(folder.path(), &["facet", "tip.stp"]);
+    assert!(
+        code == 0 && err.contains("1 of 2 faces got no facets") && err.contains("#10: it has no area"),
+        "{err}"
+    );
+    let (code, out, err) = lampyris_in(folder.path(), &["facet", "tip.stp", "--json"]);
+    assert_eq!(code, 0, "{err}");
+    let found: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(found["failed"][0]["cause"], "no_area");
+    assert_eq!(found["faces"]["meshed"], 1);
+    assert!((found["area_mm2"].as_f64().unwrap() - 100.0).abs() < 1e-9);
 }

@@ -90,9 +90,11 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
     }
     let refused = input_files::report_refusals(&loaded, command.limits.max_refused, console);
     let placed = made.report.faces.meshed + made.report.faces.failed;
-    let over = made.report.faces.failed as f64 > command.limits.max_refused * placed as f64;
+    let missing = made.report.missing_faces();
+    let over = missing as f64 > command.limits.max_refused * placed as f64;
     if made.report.faces.failed > 0 {
-        let message = format!("{} of {placed} faces got no facets", made.report.faces.failed);
+        let why = if missing == 0 { ", for they have no area: nothing is missing" } else { "" };
+        let message = format!("{} of {placed} faces got no facets{why}", made.report.faces.failed);
         console.say_or_insist(over, message);
         for face in made.report.failed.iter().take(NAMED_FAILURES) {
             let entity = face.entity.map_or(format!("face {}", face.face), |id| format!("#{id}"));
