@@ -4,21 +4,26 @@
 //! Neighbours run along their common edge in opposite directions. A face whose flag of sense says otherwise is turned, if few do.
 //!
 //! Some exporters write the shell of a mirrored part so, and its readers turn it. The volume tells, by the divergence theorem over a
-//! grid of points on each face. First on few; where that says inside out on more, and with a bound on the error that thin walls
-//! fail, for which the file is believed.
+//! grid of points on each face. First on few; where that says inside out on more, and of thin walls, whose volume is what is left of
+//! larger terms, with a bound on the error face by face. Where that is not met the file is believed.
 
 use crate::math::polygon::{is_inside_polygons, signed_area};
-use crate::math::{Aabb, Point, Uv};
+use crate::math::{Aabb, Point, Uv, Vector};
 use crate::model::{Analytic, EdgeId, Face};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-/// Points across a face of the first look and of the two that decide.
-const GRIDS: [usize; 3] = [4, 16, 23];
+/// Points across a face of the first look, of the two that decide, and of one more that thin walls need.
+const GRIDS: [usize; 4] = [4, 16, 23, 46];
+/// Share of the sum of all terms, whatever their signs, from which on two grids decide: quadrature and polygons for trims are better.
+const NOT_THIN: f64 = 0.02;
+/// The share of it that is rounding of coordinates and of the sum.
+const ROUNDED: f64 = 1e-9;
 /// Share of the diagonal of a box by which points in it may lie beside it: far more than files round by.
 const BOX_ROUNDING: f64 = 1e-4;
-/// Points on each edge of a loop.
+/// Points on each edge of a loop, and for thin walls.
 const EDGE: usize = 6;
+const EDGE_OF_THIN: usize = 24;
 
 /// Returns the indices of faces, ascending, whose sense contradicts their neighbours'. In each set of faces joined by edges that two of
 /// them use, faces fall into two groups that contradict each other along all edges between them; the smaller one is returned. None of a set
@@ -82,27 +87,46 @@ pub(crate) fn faces_against_neighbours(faces: &[Face]) -> Vec<usize> {
 /// Whether the faces of a shell of a solid, all of them, certainly look the wrong way: inwards, or away from what a `void` encloses; false
 /// where that is not certain.
 pub(crate) fn is_inside_out(faces: &[Face], void: bool) -> bool {
-    let loops: Vec<Vec<Vec<Uv>>> = faces.par_iter().map(loop_polygons).collect();
     // About the middle of the solid the terms are least, and what cancels between faces with them.
     let around = Aabb::from_points(faces.iter().map(|f| f.surface.evaluate(domain_center(f))));
     if around.is_empty() {
         return false;
     }
-    let flux = |grid: usize| {
-        let of = |(face, loops): (&Face, &Vec<Vec<Uv>>)| flux(face, loops, around.center(), grid);
-        let parts: Vec<[f64; 2]> = faces.par_iter().zip(&loops).map(of).collect();
-        let [volume, whole] = parts.into_iter().fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
-        // The faces of a void look into it, away from the solid: a right one has a negative volume.
-        [if void { -volume } else { volume }, whole]
+    let polygons =
+        |count: usize| -> Vec<Vec<Vec<Uv>>> { faces.par_iter().map(|face| loop_polygons(face, count)).collect() };
+    let flows = |loops: &[Vec<Vec<Uv>>], grid: usize| -> Vec<Flow> {
+        faces.par_iter().zip(loops).map(|(face, loops)| flow(face, loops, around.center(), grid)).collect()
     };
+    // The faces of a void look into it, away from the solid: a right one has a negative volume.
+    let volume = |flow: &Flow| if void { -flow.volume } else { flow.volume };
+    let loops = polygons(EDGE);
     // Most shells are right: a coarse look is enough to leave them.
-    let [volume, _] = flux(GRIDS[0]);
-    if volume.is_nan() || volume >= 0.0 {
+    let first = volume(&sum(&flows(&loops, GRIDS[0])));
+    if first.is_nan() || first >= 0.0 {
         return false;
     }
-    let ([coarse, _], [fine, whole]) = (flux(GRIDS[1]), flux(GRIDS[2]));
-    // Negative by more than what a finer grid changed, and by more than a sliver of the whole: a flat or a twisted shell stays as it is.
-    fine < 0.0 && -fine > 4.0 * (fine - coarse).abs() && -fine > 0.02 * whole
+    let (coarse, fine) = (flows(&loops, GRIDS[1]), flows(&loops, GRIDS[2]));
+    let (before, after) = (sum(&coarse), sum(&fine));
+    let changed = (volume(&after) - volume(&before)).abs();
+    // Negative by more than what a finer grid changed.
+    let is_negative = volume(&after) < 0.0 && -volume(&after) > 4.0 * changed;
+    if !is_negative {
+        return false;
+    }
+    if -volume(&after) > NOT_THIN * after.whole {
+        return true;
+    }
+    // A sliver of the whole: a flat shell, where errors of faces may cancel by chance, or a twisted one, whose volume depends on the point
+    // that it is seen from, stays as it is.
+    let finest = flows(&polygons(EDGE_OF_THIN), GRIDS[3]);
+    let change = |k: usize| {
+        let [a, b, c] = [&coarse, &fine, &finest].map(|flows| flows[k].volume);
+        // Two grids may be off alike, where a knot lies between their points.
+        (b - a).abs().max((c - b).abs())
+    };
+    let off: f64 = (0..faces.len()).map(change).sum();
+    let last = sum(&finest);
+    -volume(&last) > 4.0 * off + last.area.length() * around.diagonal() + ROUNDED * last.whole
 }
 
 /// Whether a void is none, as part of it certainly lies outside of the shell that is said to enclose it.
@@ -126,33 +150,53 @@ fn domain_center(face: &Face) -> Uv {
     Uv::new(0.5 * (u0 + u1), 0.5 * (v0 + v1))
 }
 
-/// Returns a face's loops as polygons, in parameters: [`EDGE`] points on each edge, in the direction of the loop.
-fn loop_polygons(face: &Face) -> Vec<Vec<Uv>> {
+/// What flows out of a face, or of several.
+#[derive(Clone, Copy, Debug, Default)]
+struct Flow {
+    /// A third of the flow of `p - center`, mm³: by Gauss's theorem, out of a closed surface, its volume.
+    volume: f64,
+    /// What that would be with all signs alike, mm³.
+    whole: f64,
+    /// The flow of 1, mm²: nothing, out of a closed surface.
+    area: Vector,
+}
+
+fn sum(flows: &[Flow]) -> Flow {
+    flows.iter().fold(Flow::default(), |a, b| Flow {
+        volume: a.volume + b.volume,
+        whole: a.whole + b.whole,
+        area: a.area + b.area,
+    })
+}
+
+/// Returns a face's loops as polygons, in parameters: `count` points on each edge, in the direction of the loop.
+fn loop_polygons(face: &Face, count: usize) -> Vec<Vec<Uv>> {
     let points = |u: &crate::model::EdgeUse| {
         let ([a, b], reversed) = (u.uv.domain(), u.reversed);
-        (0..EDGE)
-            .map(|i| i as f64 / EDGE as f64)
+        (0..count)
+            .map(|i| i as f64 / count as f64)
             .map(|s| u.uv.evaluate(a + (b - a) * if reversed { 1.0 - s } else { s }))
             .collect::<Vec<_>>()
     };
     face.loops.iter().map(|l| l.uses.iter().flat_map(points).collect()).collect()
 }
 
-/// [`flux`] of a plane, by the area that its loops enclose: the largest less all others, however they run. A grid hits rings of a tenth
-/// of a millimetre, the ends of a tube, by chance.
-fn flux_of_plane(face: &Face, loops: &[Vec<Uv>], center: Point) -> [f64; 2] {
+/// [`flow`] out of a plane, by the area that its loops enclose: the largest less all others, however they run. A grid hits rings of a
+/// tenth of a millimetre, the ends of a tube, by chance.
+fn flow_of_plane(face: &Face, loops: &[Vec<Uv>], center: Point) -> Flow {
     let areas = loops.iter().map(|polygon| signed_area(polygon).abs());
     let (sum, largest) = areas.fold((0.0, 0.0f64), |(sum, largest), area| (sum + area, largest.max(area)));
     let d = face.surface.derivatives(domain_center(face));
-    let flow = (2.0 * largest - sum) * (d.point - center).dot(d.du.cross(d.dv)) / 3.0;
-    [if face.reversed { -flow } else { flow }, flow.abs()]
+    let area = (2.0 * largest - sum) * outward(face, d.du.cross(d.dv));
+    let volume = (d.point - center).dot(area) / 3.0;
+    Flow { volume, whole: volume.abs(), area }
 }
 
-/// Returns a third of the flow of `p - center` out of a face, mm³, and what it would be with all signs alike, by the middles of a grid of
-/// `grid` cells each way over what `loops` enclose (none: all); zeros if that has no area.
-fn flux(face: &Face, loops: &[Vec<Uv>], center: Point, grid: usize) -> [f64; 2] {
+/// Returns what flows out of a face, by the middles of a grid of `grid` cells each way over what `loops` enclose (none: all); nothing if
+/// that has no area.
+fn flow(face: &Face, loops: &[Vec<Uv>], center: Point, grid: usize) -> Flow {
     if matches!(face.analytic, Analytic::Plane { .. }) && !loops.is_empty() {
-        return flux_of_plane(face, loops, center);
+        return flow_of_plane(face, loops, center);
     }
     let [[u0, u1], [v0, v1]] = face.surface.domain();
     let (mut low, mut high) = (Uv::new(u0, v0), Uv::new(u1, v1));
@@ -164,27 +208,31 @@ fn flux(face: &Face, loops: &[Vec<Uv>], center: Point, grid: usize) -> [f64; 2] 
     }
     let step = (high - low) / grid as f64;
     if !(step.x > 0.0 && step.y > 0.0) {
-        return [0.0; 2];
+        return Flow::default();
     }
-    let (mut sum, mut whole) = (0.0, 0.0);
+    let mut out = Flow::default();
     for k in 0..grid * grid {
         let uv = low + step * Uv::new((k % grid) as f64 + 0.5, (k / grid) as f64 + 0.5);
         if !is_inside_polygons(loops, uv) {
             continue;
         }
         let d = face.surface.derivatives(uv);
-        // By Gauss's theorem the flow of p/3 out of a closed surface is its volume.
-        let flow = (d.point - center).dot(d.du.cross(d.dv)) / 3.0;
-        sum += if face.reversed { -flow } else { flow };
-        whole += flow.abs();
+        let area = outward(face, d.du.cross(d.dv)) * (step.x * step.y);
+        let volume = (d.point - center).dot(area) / 3.0;
+        out = sum(&[out, Flow { volume, whole: volume.abs(), area }]);
     }
-    [sum * step.x * step.y, whole * step.x * step.y]
+    out
+}
+
+/// Turns a normal of a face's surface to the side that the face looks to.
+fn outward(face: &Face, normal: Vector) -> Vector {
+    if face.reversed { -normal } else { normal }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{Frame, Vector};
+    use crate::math::Frame;
     use crate::model::{EdgeUse, TrimLoop};
     use crate::nurbs::UvCurve;
     use crate::nurbs::sweep::{cylinder, plane};
@@ -238,5 +286,56 @@ mod tests {
         let turned: Vec<Face> = tube.iter().cloned().map(reversed).collect();
         assert!(!is_inside_out(&tube, false) && is_inside_out(&turned, false));
         assert!(is_inside_out(&tube, true) && !is_inside_out(&turned, true));
+    }
+
+    fn reversed(face: &Face) -> Face {
+        Face { reversed: !face.reversed, ..face.clone() }
+    }
+
+    /// A frame of 100 mm whose sides are 0.5 mm wide: its volume, 100² − 99² times the height, is 1.5 % of the sum of all terms.
+    #[test]
+    fn a_thin_frame_is_turned() {
+        let height = 2.0;
+        let walls = |size: f64, reversed: bool| block([size, size, height], reversed).into_iter();
+        // Sides alone: those along z are the third and the last.
+        let walls = |size: f64, reversed: bool| walls(size, reversed).enumerate().filter(|(k, _)| k % 3 != 2);
+        let square = |size: f64| {
+            let corner =
+                |k: usize| 0.5 * size * Uv::new([-1.0, 1.0, 1.0, -1.0][k % 4], [-1.0, -1.0, 1.0, 1.0][k % 4]);
+            let side = |k| EdgeUse {
+                edge: None,
+                reversed: false,
+                uv: UvCurve::line(corner(k), corner(k + 1), [0.0, 1.0]),
+            };
+            TrimLoop { uses: (0..4).map(side).collect() }
+        };
+        let end = |z: f64| {
+            let frame = Frame::translation(Vector::new(0.0, 0.0, z));
+            let surface = plane(&frame, [[-60.0, 60.0], [-60.0, 60.0]]);
+            let loops = vec![square(100.0), square(99.0)];
+            Face { analytic: Analytic::Plane { frame }, loops, reversed: z < 0.0, ..Face::whole(surface) }
+        };
+        let mut frame: Vec<Face> = walls(100.0, false).chain(walls(99.0, true)).map(|(_, face)| face).collect();
+        frame.extend([end(0.5 * height), end(-0.5 * height)]);
+        let turned: Vec<Face> = frame.iter().map(reversed).collect();
+        assert!(!is_inside_out(&frame, false) && is_inside_out(&turned, false));
+        assert!(is_inside_out(&frame, true) && !is_inside_out(&turned, true));
+        // One side turned alone: of the volume that is left the sign depends on where it is seen from.
+        let mut twisted = turned;
+        twisted[0] = reversed(&twisted[0]);
+        twisted[4] = reversed(&twisted[4]);
+        assert!(!is_inside_out(&twisted, false));
+    }
+
+    /// Two tubes in one place, one in one piece, the other in three, between which there is nothing.
+    #[test]
+    fn a_shell_without_thickness_stays_as_it_is() {
+        let wall = |from: f64, to: f64| Face::whole(cylinder(&Frame::IDENTITY, 3.6, [from, to], [0.0, 10.0]));
+        let pieces = [[0.0, 1.0], [1.0, 2.5], [2.5, TAU]].map(|[from, to]| reversed(&wall(from, to)));
+        let shell: Vec<Face> = std::iter::once(wall(0.0, TAU)).chain(pieces).collect();
+        let turned: Vec<Face> = shell.iter().map(reversed).collect();
+        for void in [false, true] {
+            assert!(!is_inside_out(&shell, void) && !is_inside_out(&turned, void));
+        }
     }
 }
