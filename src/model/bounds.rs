@@ -13,6 +13,12 @@ use crate::nurbs::ControlPoint;
 const GRID: [usize; 2] = [12, 256];
 /// Samples per direction that are followed uphill.
 const STARTS: usize = 3;
+/// Pieces of a span of a bent trim whose ends are compared.
+const PIECES: usize = 8;
+/// Cuts by a third that find the highest place of a trim: to 1e-7 of a piece, and so to 1e-14 of its height.
+const THIRDS: usize = 40;
+/// Share of a face's size by which a place of a trim that was sought lies beyond the box, not by rounding.
+const ROUNDING: f64 = 1e-12;
 /// Rounds of the climb; a round without progress halves its stride, so that it ends below 1e-7 of a cell.
 const ROUNDS: usize = 24;
 
@@ -148,6 +154,14 @@ fn grow_by_face(face: &Face, placement: &Frame, mut bounds: Aabb) -> Aabb {
     let outline = Outline::new(face);
     let border = outline.polygons.iter().flatten().map(|uv| position(*uv));
     bounds = bounds.union(Aabb::from_points(border));
+    // Between two corners of its polygon a bent trim may reach farther, where no climb inside of it comes to.
+    for side in SIDES {
+        if side.reach(&hull) > side.reach(&bounds) {
+            let level = side.reach(&bounds) + ROUNDING * hull.diagonal();
+            let summits = trim_summits(face, |uv| side.height(position(uv)), level);
+            bounds = bounds.union(Aabb::from_points(summits.into_iter().map(position)));
+        }
+    }
     if covers(&bounds, &hull) {
         return bounds;
     }
@@ -180,6 +194,44 @@ fn grow_by_face(face: &Face, placement: &Frame, mut bounds: Aabb) -> Aabb {
     bounds
 }
 
+/// Returns the parameters of the highest places of a face's bent trims that lie above `level`. Straight ones are sides of the outline, which
+/// the climb inside of it follows.
+fn trim_summits(face: &Face, height: impl Fn(Uv) -> f64, level: f64) -> Vec<Uv> {
+    let mut summits = Vec::new();
+    let loops = face.bounding_loops();
+    for curve in loops.iter().flat_map(|l| &l.uses).map(|u| &u.uv).filter(|curve| curve.degree > 1) {
+        let along = |t: f64| height(curve.evaluate(t));
+        for span in curve.breakpoints().windows(2) {
+            let t = |k: usize| span[0] + (span[1] - span[0]) * k as f64 / PIECES as f64;
+            let heights: Vec<f64> = (0..=PIECES).map(|k| along(t(k))).collect();
+            for (k, &here) in heights.iter().enumerate() {
+                let (before, after) = (k.saturating_sub(1), (k + 1).min(PIECES));
+                let beside = [heights[before], heights[after]];
+                // Above the higher of three places a curve rises by less than the lowest lies below it.
+                let is_top = beside.iter().all(|h| here >= *h);
+                if is_top && 2.0 * here - beside[0].min(beside[1]) > level {
+                    let top = highest(along, [t(before), t(after)]);
+                    summits.extend((along(top) > level).then(|| curve.evaluate(top)));
+                }
+            }
+        }
+    }
+    summits
+}
+
+/// Returns the parameter between `from` and `to` at which a height that rises and falls once is greatest.
+fn highest(height: impl Fn(f64) -> f64, [mut from, mut to]: [f64; 2]) -> f64 {
+    for _ in 0..THIRDS {
+        let third = (to - from) / 3.0;
+        if height(from + third) < height(to - third) {
+            from += third;
+        } else {
+            to -= third;
+        }
+    }
+    0.5 * (from + to)
+}
+
 /// Follows a height uphill inside the trims from `start`, first in strides of half a cell, and returns the parameters of the summit.
 fn climb(start: Uv, cell: Uv, height: impl Fn(Uv) -> f64, outline: &Outline) -> Uv {
     let mut uv = start;
@@ -204,4 +256,25 @@ fn climb(start: Uv, cell: Uv, height: impl Fn(Uv) -> f64, outline: &Outline) -> 
         }
     }
     uv
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{EdgeUse, TrimLoop};
+    use crate::nurbs::{UvCurve, sweep};
+
+    /// Below y = 8 t − 7 t², a parabola whose summit of 16/7 at t = 4/7 is no corner of its polygon.
+    #[test]
+    fn a_box_reaches_to_the_summit_of_a_bent_trim() {
+        let points = [(0.0, 0.0), (2.0, 4.0), (3.0, 1.0)].map(|(x, y)| Point::new(x, y, 1.0)).to_vec();
+        let bent = UvCurve { degree: 2, knots: vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0], points };
+        let straight = UvCurve::line(Uv::ZERO, Uv::new(3.0, 1.0), [0.0, 1.0]);
+        let uses = [(straight, false), (bent, true)].map(|(uv, reversed)| EdgeUse { edge: None, reversed, uv });
+        let plane = sweep::plane(&Frame::IDENTITY, [[-5.0, 5.0]; 2]);
+        let face = Face { loops: vec![TrimLoop { uses: uses.to_vec() }], ..Face::whole(plane) };
+        let bounds = face.bounds(&Frame::IDENTITY);
+        assert!((bounds.max - Point::new(3.0, 16.0 / 7.0, 0.0)).length() < 1e-9, "{bounds:?}");
+        assert!(bounds.min.length() < 1e-9, "{bounds:?}");
+    }
 }
