@@ -194,8 +194,8 @@ fn grow_by_face(face: &Face, placement: &Frame, mut bounds: Aabb) -> Aabb {
     bounds
 }
 
-/// Returns the parameters of the highest places of a face's bent trims that lie above `level`. Straight ones are sides of the outline, which
-/// the climb inside of it follows.
+/// Returns the parameters of the highest places of a face's bent trims that lie above `level`. Straight ones are sides of the outline,
+/// which the climb inside of it follows.
 fn trim_summits(face: &Face, height: impl Fn(Uv) -> f64, level: f64) -> Vec<Uv> {
     let mut summits = Vec::new();
     let loops = face.bounding_loops();

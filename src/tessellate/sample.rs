@@ -320,8 +320,8 @@ mod tests {
         }
     }
 
-    /// A flat face of which two sides are one corner: S(u, v) = (uv, uv (u − v)). The facet between both ends of the one side is a line, over
-    /// whose parameters the surface goes 0.13 mm to the side, where other facets are.
+    /// A flat face of which two sides are one corner: S(u, v) = (uv, uv (u − v)). The facet between both ends of the one side is a line,
+    /// over whose parameters the surface goes 0.13 mm to the side, where other facets are.
     #[test]
     fn a_facet_that_a_pole_has_made_a_line_stands_for_nothing() {
         let o = Point::ZERO;
