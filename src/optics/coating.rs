@@ -146,8 +146,8 @@ impl CoatingTable {
     /// A table from cells angle by angle, in each wavelength by wavelength (nm); shares together above 1 as in [`Coating::ideal`].
     ///
     /// # Errors
-    /// When an axis is empty or not strictly increasing, angles leave 0 to 90° or wavelengths 1 to 1e6 nm, there are more or fewer cells, or
-    /// a share is not from 0 to 1 or two are more than 1 together.
+    /// When an axis is empty or not strictly increasing, angles leave 0 to 90° or wavelengths 1 to 1e6 nm, there are more or fewer cells,
+    /// or a share is not from 0 to 1 or two are more than 1 together.
     pub fn new(angles_deg: Vec<f64>, wavelengths_nm: Vec<f64>, mut cells: Vec<Split>) -> Result<Self, Error> {
         let what = "coating";
         if angles_deg.is_empty() || wavelengths_nm.is_empty() {
