@@ -51,7 +51,8 @@ impl FacetNormals {
         if !self.in_edge && r.dot(self.geometric) * d.dot(self.geometric) < 0.0 {
             return r;
         }
-        self.corrections += 1;
+        // On a true surface both normals are one, and nothing is corrected.
+        self.corrections += u32::from(normal != self.geometric);
         reflect(d, self.geometric)
     }
 

@@ -2,7 +2,7 @@
 
 use super::monitor::Monitor;
 use super::prepared_scene::{PreparedScene, TraceRequest};
-use crate::simulate::{PartialRun, Results};
+use crate::simulate::{GROWING_REPLICATE, PartialRun, Results};
 
 /// The most rays, where the settings do not say.
 const MOST_RAYS: u64 = 10_000_000_000;
@@ -12,6 +12,9 @@ const MARGIN_SIGMAS: f64 = 2.0;
 const MOST_MARGIN: f64 = 2.0;
 /// Least and greatest growth of the rays: fewer would be a run for little, more would trust a poor first error too much.
 const GROWTH_RANGE: [f64; 2] = [2.0, 64.0];
+
+/// From so many replicates on a run is divided into those of one that grows, where its rays fill them.
+const LONG_RUN_REPLICATES: u64 = 128;
 
 /// Keeps a run while it is traced, so that what is done of it outlives its process.
 pub trait RunKeeper {
@@ -83,10 +86,17 @@ pub(super) fn growth_margin(replicates: u32) -> f64 {
     (1.0 + MARGIN_SIGMAS * 2.0 / f64::from(replicates.max(2) - 1).sqrt()).min(MOST_MARGIN)
 }
 
-/// Returns the number of rays of the run after one of `rays`: `growth` times as many, kept within [`GROWTH_RANGE`]; at most `most`.
+/// Returns the number of rays of the run after one of `rays`: `growth` times as many, kept within [`GROWTH_RANGE`], of many in whole
+/// replicates of a run that grows, or they would be divided otherwise among sources; at most `most`.
 pub(super) fn next_rays(rays: u64, growth: f64, most: u64) -> u64 {
     let [least, greatest] = GROWTH_RANGE;
-    ((rays as f64 * growth.clamp(least, greatest)) as u64).min(most)
+    let next = (rays as f64 * growth.clamp(least, greatest)) as u64;
+    let next = if next < LONG_RUN_REPLICATES * GROWING_REPLICATE {
+        next
+    } else {
+        next.next_multiple_of(GROWING_REPLICATE)
+    };
+    next.min(most)
 }
 
 #[cfg(test)]
@@ -109,5 +119,7 @@ mod tests {
         let next = |growth: f64| next_rays(1_000, growth, 50_000);
         assert_eq!([1.1, 2.0, 4.4, 50.0, 1e9].map(next), [2_000, 2_000, 4_400, 50_000, 50_000]);
         assert_eq!(next_rays(1_000, 1e9, MOST_RAYS), 64_000);
+        // 907,109,336 of a source a billion times as strong as the next: with another division than before, none were left for that.
+        assert_eq!(next_rays(204_800_000, 4.429_244, MOST_RAYS), 907_110_000);
     }
 }

@@ -298,7 +298,8 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         };
         let point = ray.point_at(ray.t_max);
         let numbers = path.key(context).pair(Purpose::BulkDirection);
-        path.run(ray.t_max);
+        path.length += ray.t_max;
+        path.short_segments = 0;
         // Light that was held by total reflection has another direction now, and may get out.
         path.release();
         // Before it is counted among the hits, as at a face: vertices of a path stand in the order of their hits.

@@ -175,8 +175,10 @@ fn add_shells(
     // A face moves into the last shell that has it, and is copied into those before.
     let mut left: FxHashMap<u64, usize> = FxHashMap::default();
     items.shells.iter().flat_map(|s| &s.faces).for_each(|f| *left.entry(f.0).or_default() += 1);
-    // A void without the shell around it stands alone: which of the part's shells that is.
-    let mut outer: Option<usize> = None;
+    // A void without the shell around it stands alone: which of the part's shells that is, and whether it has all its faces.
+    let mut outer: Option<(usize, bool)> = None;
+    // Behind the true voids, which belong to the shell before them.
+    let mut beside: Vec<Shell> = Vec::new();
     let mut removed: FxHashSet<u64> = FxHashSet::default();
     for plan in &items.shells {
         let layer = plan.owners.iter().find_map(|o| styles.layer(*o));
@@ -191,6 +193,9 @@ fn add_shells(
             own.push(face);
         }
         let is_complete = own.len() == plan.faces.len();
+        if !plan.void {
+            part.shells.append(&mut beside);
+        }
         for RepeatedFace { id, standing } in remove_repeated_faces(&mut own, part, geometry.units) {
             let (Some(id), Some(standing)) = (id, standing) else { continue };
             let reason = format!("it stands where #{standing} does: it is left out");
@@ -205,7 +210,10 @@ fn add_shells(
         }
         // Only a whole shell tells by its volume which way it faces.
         let mut void = plan.void && outer.is_some();
-        if void && outer.is_some_and(|outer| lies_outside(&own, &part.shells[outer].faces)) {
+        // Below a dome that was refused a void is outside of what is left.
+        let around =
+            outer.filter(|(_, is_whole)| *is_whole).filter(|_| plan.void).map(|(k, _)| &part.shells[k].faces);
+        if around.is_some_and(|around| lies_outside(&own, around)) {
             void = false;
             // Of four pipes in a row, three of them voids of the first, light lost a fifth.
             let reason = "a void lies outside of the shell that it is in: it is taken as a solid of its own";
@@ -220,10 +228,11 @@ fn add_shells(
             out.repaired.extend(plan.owners.first().map(|owner| repair_note(file, *owner, reason.into())));
         }
         if !plan.void {
-            outer = (!own.is_empty()).then_some(part.shells.len());
+            outer = (!own.is_empty()).then_some((part.shells.len(), whole));
         }
         if !own.is_empty() {
-            part.shells.push(Shell {
+            let shells = if plan.void && !void && outer.is_some() { &mut beside } else { &mut part.shells };
+            shells.push(Shell {
                 faces: own,
                 closed: plan.closed,
                 void,
@@ -232,6 +241,7 @@ fn add_shells(
             });
         }
     }
+    part.shells.append(&mut beside);
     // One that stands in another shell counts all the same.
     let standing = part.shells.iter().flat_map(|shell| &shell.faces).filter_map(|face| face.entity);
     for id in standing {

@@ -126,13 +126,13 @@ pub(crate) fn is_inside_out(faces: &[Face], void: bool) -> bool {
     };
     let off: f64 = (0..faces.len()).map(change).sum();
     let last = sum(&finest);
-    -volume(&last) > 4.0 * off + last.area.length() * around.diagonal() + ROUNDED * last.whole
+    -volume(&last) > 4.0 * off + last.area.length() * bounds(faces).diagonal() + ROUNDED * last.whole
 }
 
 /// Whether a void is none, as part of it certainly lies outside of the shell that is said to enclose it.
 pub(crate) fn lies_outside(void: &[Face], outer: &[Face]) -> bool {
     // Surfaces lie within their boxes, and so does all that they enclose; trims may cut off much of one.
-    let enclosed = outer.iter().fold(Aabb::EMPTY, |all, face| all.union(face.surface.bounds()));
+    let enclosed = bounds(outer);
     let enclosed = enclosed.grown(BOX_ROUNDING * enclosed.diagonal());
     let corners = |face: &Face| {
         let uses = face.loops.iter().flat_map(|l| &l.uses);
@@ -143,6 +143,11 @@ pub(crate) fn lies_outside(void: &[Face], outer: &[Face]) -> bool {
         corners.into_iter().map(|uv| face.surface.evaluate(uv)).collect::<Vec<Point>>()
     };
     void.iter().flat_map(corners).any(|corner| corner.is_finite() && !enclosed.contains(corner))
+}
+
+/// The box around the surfaces of faces, trimmed or not.
+fn bounds(faces: &[Face]) -> Aabb {
+    faces.iter().fold(Aabb::EMPTY, |all, face| all.union(face.surface.bounds()))
 }
 
 fn domain_center(face: &Face) -> Uv {

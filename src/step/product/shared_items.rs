@@ -93,9 +93,13 @@ impl SharedItems {
         let mut of_solids = PlaceTable::default();
         if !surfaces.is_empty() {
             let solids = shells_of(&MODELS[..SOLIDS]);
+            let solids_of = |p: &PlacedRepresentation| solids.get(&p.representation).into_iter().flatten();
+            let of_products: FxHashSet<u64> =
+                placed.iter().filter(|p| !p.orphan).flat_map(solids_of).map(|(solid, _)| *solid).collect();
             for p in placed {
-                let shells = solids.get(&p.representation).into_iter().flatten().flat_map(|(_, shells)| shells);
-                shells.for_each(|&shell| of_solids.insert(shell, place_of(p)));
+                // An orphan's solid that a product has brought anywhere does not stand with the orphan.
+                let standing = solids_of(p).filter(|(solid, _)| !p.orphan || !of_products.contains(solid));
+                standing.flat_map(|(_, shells)| shells).for_each(|&shell| of_solids.insert(shell, place_of(p)));
             }
         }
         Self {
