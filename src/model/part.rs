@@ -1,9 +1,8 @@
 //! Parts: shells of faces over common edges and vertices.
 
-use super::edge::{Edge, EdgeId};
-use super::{Analytic, Colour, Face, TessellatedFace};
+use super::edge::Edge;
+use super::{Colour, Face, TessellatedFace};
 use crate::math::Point;
-use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -41,50 +40,6 @@ pub struct Shell {
     pub colour: Option<Colour>,
     /// Name of the shell or solid, empty when it had none.
     pub name: String,
-}
-
-/// Share of a surface's size within which control points are the same: far more than rounding, far less than any wall is thick.
-const SAME: f64 = 1e-9;
-
-impl Shell {
-    /// Whether all faces lie on each other, two and two, back to back, so that there is nothing between them: they have the same edges, and
-    /// are planes or have one surface. False where other faces enclose nothing either.
-    pub fn encloses_nothing(&self) -> bool {
-        let mut alone: FxHashMap<Vec<(EdgeId, bool)>, Vec<&Face>> = FxHashMap::default();
-        for face in &self.faces {
-            let own = border(face, false);
-            if own.is_empty() {
-                return false;
-            }
-            let facing = alone.get_mut(&border(face, true));
-            let back = facing.and_then(|others| {
-                let k = others.iter().position(|other| are_surfaces_one(face, other))?;
-                Some(others.swap_remove(k))
-            });
-            if back.is_none() {
-                alone.entry(own).or_default().push(face);
-            }
-        }
-        !self.faces.is_empty() && alone.values().all(Vec::is_empty)
-    }
-}
-
-/// Returns the edges of a face, sorted, each with whether the face, seen from outside, or from inside if `turned`, runs against it.
-fn border(face: &Face, turned: bool) -> Vec<(EdgeId, bool)> {
-    let uses = face.loops.iter().flat_map(|l| &l.uses);
-    let mut border: Vec<(EdgeId, bool)> =
-        uses.filter_map(|u| Some((u.edge?, (u.reversed != face.reversed) != turned))).collect();
-    border.sort_unstable();
-    border
-}
-
-/// Whether two faces with one border, of which they lie on different sides, are on one surface: planes always are.
-fn are_surfaces_one(a: &Face, b: &Face) -> bool {
-    let are_planes = [a, b].iter().all(|face| matches!(face.analytic, Analytic::Plane { .. }));
-    let (p, q) = (&a.surface.points, &b.surface.points);
-    let same = SAME * a.surface.bounds().diagonal();
-    let are_points_one = || p.len() == q.len() && p.iter().zip(q).all(|(p, q)| (*p - *q).length() <= same);
-    are_planes || a.reversed != b.reversed && a.surface.degree == b.surface.degree && are_points_one()
 }
 
 impl Part {

@@ -10,7 +10,7 @@ use super::product::numbering::ConvertedPart;
 use super::product::shared_items::SharedItems;
 use super::product::styles::Styles;
 use super::product::topology::ShapeItems;
-use super::report::{ImportReport, Note, empty_solids};
+use super::report::{ImportReport, Note};
 use super::{Error, ErrorKind, Settings};
 use crate::formats;
 use crate::math::Aabb;
@@ -205,7 +205,6 @@ fn convert_assembly(
         }
     }
     count_model(&model, report);
-    report.problems.extend(empty_solids(&model, name));
     if report.faces.found == 0 {
         report.problems.push(format!("{name}: {}", absent_shapes(file)));
     }

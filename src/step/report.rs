@@ -1,6 +1,6 @@
 //! The account of an import, as `info --json` prints it.
 
-use crate::model::{Model, SurfaceKind};
+use crate::model::SurfaceKind;
 use serde::{Deserialize, Serialize};
 
 /// What a file holds and what could not be read: the object of `info --json`.
@@ -44,7 +44,7 @@ pub struct ImportReport {
     pub repairs: Vec<Note>,
     /// Largest distance between an edge and a face it bounds, mm of the part.
     pub gap_max_mm: f64,
-    /// Statements and placements that could not be read, with their lines or instances, and solids without a volume.
+    /// Statements and placements that could not be read, with their lines or instances.
     pub problems: Vec<String>,
     /// Whether the file was cut off: shapes may be missing of which nothing tells.
     #[serde(default)]
@@ -53,18 +53,6 @@ pub struct ImportReport {
     pub seconds: Seconds,
     /// Largest resident size of the process so far, bytes; `None` where the system does not tell.
     pub peak_bytes: Option<u64>,
-}
-
-/// Returns a sentence for each solid of a file's model that has no volume, as its faces lie on each other.
-pub(super) fn empty_solids(model: &Model, file: &str) -> Vec<String> {
-    let shells = model.parts.iter().flat_map(|part| part.shells.iter().map(move |shell| (part, shell)));
-    let empty = shells.filter(|(_, shell)| shell.closed && shell.encloses_nothing());
-    let told = |name: &str| {
-        format!(
-            "{file}: '{name}' has no volume: its faces lie on each other, two and two, and light goes to and fro between them"
-        )
-    };
-    empty.map(|(part, shell)| told(if shell.name.is_empty() { &part.name } else { &shell.name })).collect()
 }
 
 /// Names of units.

@@ -466,34 +466,3 @@ fn a_face_thinner_than_the_accuracy_of_its_file_is_left_out() {
         }
     }
 }
-
-/// A cap of a ball over the circle of its equator, in two arcs, closed by `lid` with its sense.
-fn cap(lid: &str, sense: &str) -> Vec<String> {
-    let text = part21(&format!(
-        "{MILLIMETRES}#6=ADVANCED_BREP_SHAPE_REPRESENTATION('',(#51),#1);\n\
-         #10=DIRECTION('',(0.,0.,1.));\n#11=DIRECTION('',(1.,0.,0.));\n#12=DIRECTION('',(-1.,0.,0.));\n\
-         #13=CARTESIAN_POINT('',(0.,0.,0.));\n#14=CARTESIAN_POINT('',(2.5,0.,0.));\n#15=CARTESIAN_POINT('',(-2.5,0.,0.));\n\
-         #16=VERTEX_POINT('',#14);\n#17=VERTEX_POINT('',#15);\n\
-         #18=AXIS2_PLACEMENT_3D('',#13,#10,#11);\n#19=AXIS2_PLACEMENT_3D('',#13,#10,#12);\n\
-         #20=CIRCLE('',#18,2.5);\n#21=CIRCLE('',#19,2.5);\n\
-         #22=EDGE_CURVE('',#16,#17,#20,.T.);\n#23=EDGE_CURVE('',#17,#16,#21,.T.);\n\
-         #30=ORIENTED_EDGE('',*,*,#22,.T.);\n#31=ORIENTED_EDGE('',*,*,#23,.T.);\n\
-         #32=EDGE_LOOP('',(#30,#31));\n#33=FACE_OUTER_BOUND('',#32,.T.);\n\
-         #34=SPHERICAL_SURFACE('',#18,2.5);\n#35=ADVANCED_FACE('',(#33),#34,.T.);\n\
-         #40=ORIENTED_EDGE('',*,*,#23,.F.);\n#41=ORIENTED_EDGE('',*,*,#22,.F.);\n\
-         #42=EDGE_LOOP('',(#40,#41));\n#43=FACE_OUTER_BOUND('',#42,.T.);\n\
-         #44={lid};\n#45=ADVANCED_FACE('',(#43),#44,{sense});\n\
-         #50=CLOSED_SHELL('',(#35,#45));\n#51=MANIFOLD_SOLID_BREP('cap',#50);\n"
-    ));
-    let import = read(&text);
-    assert_eq!(import.report.faces.refused, 0, "{:?}", import.report.refusals);
-    import.report.problems
-}
-
-/// Light went to and fro in the first one 20,000 times, and nothing said why; the second is half a ball.
-#[test]
-fn a_solid_whose_faces_lie_on_each_other_is_told() {
-    let problems = cap("SPHERICAL_SURFACE('',#18,2.5)", ".F.");
-    assert!(matches!(&problems[..], [told] if told.contains("'cap' has no volume")), "{problems:?}");
-    assert_eq!(cap("PLANE('',#18)", ".F."), Vec::<String>::new());
-}
