@@ -1,9 +1,9 @@
 //! Sources flush with the face of a body: they start in what the scene says that they are inside of, in the face and within the glue
 //! distance to either side of it; where it says nothing they start inside, and that is told.
 
-use crate::support::World;
+use crate::support::{Shape, World};
 use lampyris::formats::{LightRay, write_rays};
-use lampyris::math::{Point, Vector};
+use lampyris::math::{Frame, Point, Vector};
 use lampyris::simulate::{Hooks, PartialRun, Results, RunSettings, Scene, trace};
 use std::path::Path;
 
@@ -133,6 +133,85 @@ fn a_source_between_touching_bodies_starts_in_the_one_that_is_named() {
             assert!(is_right, "{inside} {height}: {power}, not {expected:?}");
         }
     }
+}
+
+/// A plate half as thick as the glue distance, of which light that goes away from it, drawn on either side, crosses nothing, and light that
+/// goes towards it both faces, wherever within the glue distance of one or both it is drawn; inside of it starts what is stated to.
+#[test]
+fn sources_beside_a_thin_plate_stay_on_their_side() {
+    let r = reflectance(0.0, 1.0, 1.5);
+    let mut world = World::default();
+    world.cuboid("plate", Point::new(-1e3, -1e3, -2.5e-4), Point::new(1e3, 1e3, 2.5e-4));
+    for offset in [0.0, 1e-4, 6e-4, 9e-4, 1.1e-3] {
+        for (side, direction) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+            // What goes on along its direction, and what comes back.
+            let outside = if side == direction { [1.0, 0.0] } else { [(1.0 - r) / (1.0 + r), 2.0 * r / (1.0 + r)] };
+            for (inside, expected) in [("[]", outside), ("'plate'", [1.0 / (1.0 + r), r / (1.0 + r)])] {
+                if inside == "'plate'" && offset > 6e-4 {
+                    continue;
+                }
+                let height = side * (2.5e-4 + offset);
+                let text = format!(
+                    "{SPLIT}{}[[source]]\nkind = 'collimated'\nat = [0, 0, {height:?}]\ndirection = [0, 0, {direction:?}]\nradius = 2
+                    inside = {inside}\n",
+                    medium("plate", 1.5)
+                );
+                let results = world.run(&text, |_| ());
+                assert_eq!(results.lost_rays, 0, "{inside} {height} {direction}: {:?}", results.ledger.first());
+                let [above, below] = [results.receivers[0].power, results.receivers[1].power];
+                let powers = if direction > 0.0 { [above, below] } else { [below, above] };
+                for (power, expected) in powers.into_iter().zip(expected) {
+                    assert!(
+                        (power - expected).abs() < 1e-5,
+                        "{inside} {height} {direction}: {power}, not {expected}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Light that is drawn at the outer face of a film on a plate, nearer to it than to the plate, and shines away has both behind it.
+#[test]
+fn a_source_on_a_film_shines_away_from_it() {
+    let mut world = World::default();
+    world.cuboid("plate", Point::new(-1e3, -1e3, -3.0), Point::new(1e3, 1e3, -5e-4)).cuboid(
+        "film",
+        Point::new(-1e3, -1e3, -5e-4),
+        Point::new(1e3, 1e3, 0.0),
+    );
+    for height in [0.0, 1e-9, -1e-9, 1e-4, -1e-4, 6e-4, 1.2e-3] {
+        let text = format!(
+            "{SPLIT}{}{}[[source]]\nkind = 'collimated'\nat = [0, 0, {height:?}]\nradius = 2\ninside = []\n",
+            medium("plate", 1.5),
+            medium("film", 1.7)
+        );
+        let results = world.run(&text, |_| ());
+        assert_eq!(results.lost_rays, 0, "{height}: {:?}", results.ledger.first());
+        let power = results.receivers[0].power;
+        assert!((power - 1.0).abs() < 1e-9, "{height}: {power}");
+    }
+}
+
+/// A black sheet half a glue distance over a plate, and beside it, takes all light of a source that lies in the face of the plate and
+/// reaches beyond its edge: starts are moved past no sheet, and those that nothing else is near not at all.
+#[test]
+fn flush_sources_stay_before_a_sheet() {
+    let mut world = World::default();
+    let frame = Frame::translation(Point::new(0.0, 0.0, 5e-4));
+    world.cuboid("plate", Point::new(-1e3, -1e3, -3.0), Point::new(0.0, 1e3, 0.0)).part(
+        "sheet",
+        false,
+        &[("up", Shape::Rectangle { frame, half: [1e3, 1e3] })],
+    );
+    let text = format!(
+        "{SPLIT}{}[[material]]\npart = 'sheet'\nsurface = 'absorber'\n
+        [[source]]\nkind = 'collimated'\nat = [0, 0, 0]\nsize = [2, 2]\ninside = []\n",
+        medium("plate", 1.5)
+    );
+    let results = world.run(&text, |_| ());
+    assert_eq!(results.lost_rays, 0, "{:?}", results.ledger.first());
+    assert_eq!((results.receivers[0].power, results.receivers[1].power), (0.0, 0.0));
 }
 
 /// Rays that were recorded in the plane of a face come through both faces where the scene says that they are in no body, and through one

@@ -282,8 +282,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             }
             StartingMedia::Stated => {
                 let inside = &context.bound.emitters[source].inside;
-                *ray =
-                    start_in_stated_media(context, inside, ray).unwrap_or_else(|| start_behind_glue(context, ray));
+                *ray = start_in_stated_media(context, inside, ray);
                 C::inside(inside)
             }
             StartingMedia::InSolid => {

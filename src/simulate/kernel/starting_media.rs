@@ -81,7 +81,7 @@ fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter, has_m
         // One start on a face decides for all: the rays of such a source must each be asked. Luminous faces find their own start.
         if emission.from.is_none() && emitter.media_stated && has_media {
             // What starts clear of all faces, on the stated side, is left as it is.
-            if start_in_stated_media(context, &emitter.inside, &ray).is_some_and(|start| start != ray) {
+            if start_in_stated_media(context, &emitter.inside, &ray) != ray {
                 return StartingMedia::Stated;
             }
         } else if emission.from.is_none() {

@@ -1,5 +1,6 @@
 //! Where the rays of a source begin that lies near faces, and of which the scene says what it is inside of: on the side of each face on
-//! which that is true, whichever side the source was drawn on, or rounding puts it.
+//! which that is true, whichever side the source was drawn on, or rounding puts it. Where it is true on both sides of a thin body, on the
+//! nearer one.
 //!
 //! Known weaknesses: between two bodies that touch there is no room, so that light that is stated to be in neither counts as coming out of
 //! the one behind it. Light that is stated to be outside of a body and starts in an edge of it is aimed at that edge, where two faces let
@@ -43,38 +44,56 @@ impl NearFace {
 
 /// Returns the ray of a source that is stated to lie inside of these bodies, and of no others, started where that is true: before the faces
 /// that it is yet to cross, of those within the glue distance of its start, and behind the others. The ray as it is where it lies clear of
-/// them; `None` where no body and no opaque solid has a face there.
+/// them, and where no body and no opaque solid has a face there.
 ///
 /// Distances to faces are those across them: along a ray that slants by 60° faces within the glue distance are met up to twice as far off.
 #[cold]
-pub(super) fn start_in_stated_media(context: &Context<'_>, inside: &[u32], ray: &Ray) -> Option<Ray> {
+pub(super) fn start_in_stated_media(context: &Context<'_>, inside: &[u32], ray: &Ray) -> Ray {
     let near = faces_near_start(context, ray);
     if !near.iter().any(NearFace::bounds_solid) {
-        return None;
+        return *ray;
     }
     let room = 2.0 * rounding_at(ray.origin);
-    let is_ahead = |f: &&NearFace| f.bounds_solid() && !f.lies_behind(inside) && !passes_edge(&near, f, room);
-    let ahead = near.iter().find(is_ahead);
-    let end = ahead.map_or(f64::INFINITY, |f| f.t);
+    let is_passed = |f: &NearFace| is_undone(&near, f, inside, room) || passes_edge(&near, f, room);
+    let is_ahead = |f: &&NearFace| f.bounds_solid() && !f.lies_behind(inside) && !is_passed(f);
+    let ahead = near.iter().find(is_ahead).map_or(f64::INFINITY, |f| f.t);
     // At one place rounding puts them in either order.
-    let behind = near.iter().rfind(|f| f.lies_behind(inside) && f.t <= end + room);
+    let behind = near.iter().rfind(|f| f.lies_behind(inside) && f.t <= ahead + room);
     let begin = behind.map_or(f64::NEG_INFINITY, |f| f.t);
+    // A sheet that is yet to be met is not passed.
+    let is_sheet_ahead = |f: &&NearFace| !f.bounds_solid() && f.t > f64::max(begin, 0.0) + 2.0 * room;
+    let sheet = near.iter().find(is_sheet_ahead).map_or(f64::INFINITY, |f| f.t);
+    let end = f64::min(ahead, sheet);
     if begin < -room && end > room {
-        return Some(*ray);
+        return *ray;
     }
     let glue = context.glue_mm();
     let start = |t: f64| Ray::new(ray.point_at(t), ray.direction);
     let clear = f64::min(glue, 0.5 * (end - begin));
-    Some(match (behind, ahead) {
+    match behind {
+        None => start(f64::min(end - room, -glue)),
         // By the glue distance, for facets that lie a little off the hits that are moved to the spline.
-        (_, None) => start(f64::max(begin + room, glue)),
-        (None, Some(_)) => start(f64::min(end - room, -glue)),
-        (Some(_), Some(_)) if end - begin > 2.0 * room => {
-            start(f64::min(f64::max(0.0, begin + clear), end - clear))
-        }
+        Some(_) if end == f64::INFINITY => start(f64::max(begin + room, glue)),
+        Some(_) if end - begin > 2.0 * room => start(f64::min(f64::max(0.0, begin + clear), end - clear)),
         // No place is between them: just before both, and past the one.
-        (Some(behind), Some(_)) => start(f64::min(begin, end) - room).with_departure(behind.hit.departure()),
-    })
+        Some(behind) => start(f64::min(begin, end) - room).with_departure(behind.hit.departure()),
+    }
+}
+
+/// Whether a face that is to be crossed by light inside of these bodies lies so far back that the ray crosses its solid back, by a face
+/// nearer to the start, of those near it: behind a thin plate light is as truly outside of it as before it, and stays on the side that it
+/// was drawn on. `room`, mm, is what rounding makes of one place.
+fn is_undone(near: &[NearFace], face: &NearFace, inside: &[u32], room: f64) -> bool {
+    let crosses_back = |f: &NearFace| {
+        // Inside of a body is inside of any of its solids, outside is outside of all.
+        let same_solid = f.face.body == face.face.body && (f.face.solid == face.face.solid || f.entering);
+        same_solid
+            && f.bounds_solid()
+            && f.lies_behind(inside)
+            && f.entering != face.entering
+            && f.t > face.t + room
+    };
+    near.iter().any(|f| crosses_back(f) && f.t + face.t < -room)
 }
 
 /// Whether a ray that comes in by this face, of those near its start, goes out of the same solid over an edge at once; `room`, mm, is what
