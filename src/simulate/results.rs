@@ -173,7 +173,7 @@ impl Results {
         // In this order notes are read: what the scene says of itself, what the run found, what the errors are
         // worth.
         let found = bodies
-            .chain(bound.flush_sources_note(&tallies.counts))
+            .chain(bound.flush_sources_note(&tallies.counts, &plan, &partial.done))
             .chain(bound.lost_note(lost, &tallies.ledger))
             .chain(bound.scarce_sources_note(&plan))
             .chain(bound.heavy_rays_note(&plan, &partial.done))

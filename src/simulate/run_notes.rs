@@ -10,6 +10,9 @@ use crate::text::{count_of, figures, first_sentences, grouped};
 /// Segments to one meeting of an overlap from which on it is told. Beside edges where bodies touch rounding may pass for an overlap: in
 /// one scene once in 10^6 segments.
 const OVERLAP_SEGMENTS: u64 = 10_000;
+/// Rays of a source to one that starts in a face and shines into it, from which on that is told: fewer are those that chance puts within
+/// the glue distance of a face that a source stands across.
+const FLUSH_RAYS: u64 = 10_000;
 /// Rays of a source below which next to nothing is known of its light.
 const SCARCE_RAYS: u64 = 64;
 /// Power of a ray over that of the mean one above which it is told that a source has few of them.
@@ -66,18 +69,18 @@ impl BoundScene {
     }
 
     /// Returns one sentence about sources that lie in the face of a body and shine into it, where the scene does not say what they are in,
-    /// naming the first; `None` where fewer rays than one in [`OVERLAP_SEGMENTS`] start so.
-    pub(crate) fn flush_sources_note(&self, counts: &Counts) -> Option<String> {
-        if counts.flush_starts <= counts.rays / OVERLAP_SEGMENTS {
+    /// naming the first; `None` where fewer start so than one in [`FLUSH_RAYS`] of the rays that it has in the replicates that are `done`.
+    pub(crate) fn flush_sources_note(&self, counts: &Counts, plan: &Plan, done: &[u32]) -> Option<String> {
+        let [source, face] = counts.flush_place;
+        if counts.flush_starts == 0 || counts.flush_starts <= plan.rays_in(source as usize, done) / FLUSH_RAYS {
             return None;
         }
-        let [source, face] = counts.flush_place;
         let body = self.faces.get(face as usize)?.body;
         let [name, medium] = self.body_names(body)?;
         Some(format!(
-            "{} lies in {} and shines into it: its light ({} of the run) is taken to start inside '{name}' ({medium}), as if glued to \
-             it, and loses nothing in that face; move it off by more than [run] glue_mm = {:e}, or say by `inside` which bodies it lies \
-             in: `inside = []` for none, as behind a gap of air, `inside = [\"{name}\"]` for what is taken now",
+            "{} lies in {} and shines into it: light that starts so, {} in all, is taken to start inside of the body, here '{name}' \
+             ({medium}), as if glued to it, and loses nothing in its face; move the source off by more than [run] glue_mm = {:e}, as \
+             behind a gap of air, or say by `inside` which bodies it lies in, outermost first",
             self.scene.source_label(source as usize),
             self.face_label(face),
             count_of(counts.flush_starts, "ray"),

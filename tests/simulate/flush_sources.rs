@@ -258,7 +258,7 @@ fn a_flush_source_of_which_nothing_is_said_is_told() {
         let results = world.run(&format!("{SPLIT}{}{source}", medium("plate", 1.5)), |_| ());
         let (power, expected) = (results.receivers[0].power, through[usize::from(told)]);
         assert!((power - expected).abs() < 1e-5, "{height}: {power}, not {expected}");
-        let words = "[[source]] 1 lies in face #109 of 'plate' and shines into it: its light (2000 rays of the run) is taken to start";
+        let words = "[[source]] 1 lies in face #109 of 'plate' and shines into it: light that starts so, 2000 rays in all, is taken";
         assert_eq!(results.notes.iter().any(|note| note.starts_with(words)), told, "{height}: {:?}", results.notes);
     }
 }
@@ -293,6 +293,32 @@ fn flush_sources_that_are_meant_so_are_not_told() {
     );
     let results = world.run(&text, |_| ());
     assert!(!is_told(&results), "{:?}", results.notes);
+}
+
+/// In the contact of two plates light goes from one into the other: that is told where their indices differ, and not where they are the
+/// same, whatever is around them.
+#[test]
+fn a_source_between_plates_is_told_where_they_differ() {
+    let mut world = plate();
+    world.cuboid("lower", Point::new(-1e3, -1e3, -3.0), Point::new(1e3, 1e3, 0.0));
+    for (index, told) in [(1.5, false), (1.7, true)] {
+        let media = medium("plate", 1.5) + &medium("lower", index);
+        let source = "[[source]]\nkind = 'collimated'\nradius = 2\n";
+        let results = world.run(&format!("[run]\nrays = 500\n{media}{source}"), |_| ());
+        assert_eq!(is_told(&results), told, "{index}: {:?}", results.notes);
+    }
+}
+
+/// Whether so few rays start in a face that they need not be told is judged by the rays of their source, however many others send.
+#[test]
+fn flush_sources_are_told_by_their_own_rays() {
+    let text = format!(
+        "[run]\nrays = 40_000\nreplicates = 8\n{}[[source]]\nkind = 'collimated'\nrays = 2\n
+        [[source]]\nkind = 'collimated'\nat = [0, 0, 9]\n",
+        medium("plate", 1.5)
+    );
+    let results = plate().run(&text, |_| ());
+    assert!(is_told(&results), "{:?}", results.notes);
 }
 
 /// What is known of flush sources outlives the file of a part of a run and the sum of two.

@@ -175,7 +175,8 @@ pub(super) fn start_clear_of_faces(context: &Context<'_>, ray: &Ray) -> Option<C
     let into_opaque = enters_opaque && !leaves_opaque;
     // What shines out of a die lies glued between it and its dome. Over an edge, and between two solids of one body, nothing is entered.
     let passes = |face: &FaceOptics| {
-        !(enters_opaque || leaves_opaque || left.contains(&face.body)) && changes_light(context, face)
+        let from = left.last().map_or(AMBIENT, |&body| body);
+        !(enters_opaque || leaves_opaque || left.contains(&face.body)) && changes_light(context, face, from)
     };
     on_solid.then(|| ClearStart {
         ray: if into_opaque { before } else { start_behind_glue(context, ray) },
@@ -184,12 +185,12 @@ pub(super) fn start_clear_of_faces(context: &Context<'_>, ray: &Ray) -> Option<C
     })
 }
 
-/// Whether a face of a body changes light that comes in by it: `false` where none does, so that a source in it can only be meant to lie
-/// inside, and for the bare face of a body that has the index of the surroundings.
-fn changes_light(context: &Context<'_>, face: &FaceOptics) -> bool {
+/// Whether a face of a body changes light that comes in by it out of another body: `false` where none does, so that a source in it can only
+/// be meant to lie inside, and for a bare face between bodies of one index.
+fn changes_light(context: &Context<'_>, face: &FaceOptics, from: u32) -> bool {
     let bound = context.bound;
     match &bound.surfaces[usize::from(face.surface)] {
-        Surface::Interface => !bound.bodies[face.body as usize].matches_index(&bound.bodies[AMBIENT as usize]),
+        Surface::Interface => !bound.bodies[face.body as usize].matches_index(&bound.bodies[from as usize]),
         surface => !surface.is_opaque(),
     }
 }
