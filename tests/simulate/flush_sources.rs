@@ -321,6 +321,23 @@ fn flush_sources_are_told_by_their_own_rays() {
     assert!(is_told(&results), "{:?}", results.notes);
 }
 
+/// What a source of fewer rays than replicates lies in is found wherever its rays are: of 128 replicates every other one was asked.
+#[test]
+fn sources_of_few_rays_know_what_they_lie_in() {
+    for rays in [1, 2, 32, 100] {
+        let text = format!(
+            "{}{}[[source]]\nkind = 'collimated'\nat = [0, 0, 1]\nrays = {rays}\n
+            [[source]]\nkind = 'collimated'\nat = [0, 0, 9]\n",
+            SPLIT.replace("rays = 2000", "rays = 4000"),
+            medium("plate", 1.5)
+        );
+        let results = plate().run(&text, |_| ());
+        assert_eq!(results.lost_rays, 0, "{rays}: {:?}", results.ledger.first());
+        // Half of the light starts in the plate, and all of what comes down has gone through its lower face.
+        assert!(results.receivers[1].power > 1e-3, "{rays}: {}", results.receivers[1].power);
+    }
+}
+
 /// What is known of flush sources outlives the file of a part of a run and the sum of two.
 #[test]
 fn parts_of_a_run_know_of_flush_sources() {

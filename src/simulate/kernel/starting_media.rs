@@ -12,6 +12,7 @@ use crate::simulate::bind::BoundScene;
 use crate::simulate::body::AMBIENT;
 use crate::simulate::emitter::{Emitter, Portion, RaySampler};
 use crate::simulate::outcome::Counts;
+use crate::simulate::plan::Plan;
 use crate::simulate::settings::RunSettings;
 use crate::simulate::surfaces::{FaceOptics, Surface};
 
@@ -63,10 +64,7 @@ fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter, has_m
         // Over all replicates and the whole of each: they are spread over the whole of a ray list. As many where replicates are few, of
         // which each has several then: two rays would tell nothing of a source that straddles a boundary.
         let replicate = (k * u64::from(replicates) / PROBED_RAYS) as u32;
-        let [from, to] = context.plan.range(source, replicate);
-        if from == to {
-            continue;
-        }
+        let Some((replicate, [from, to])) = replicate_with_rays(&context.plan, source, replicate) else { continue };
         let s = context.settings;
         let lattice = context.plan.lattice(replicate);
         let portion = Portion { replicate, source: source as u32, rays: to - from, lattice };
@@ -115,6 +113,18 @@ fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter, has_m
     }
     // All probes agree: the others are taken to, and no ray pays for the search.
     StartingMedia::Same(first.unwrap_or_else(|| emitter.inside.clone()))
+}
+
+/// Returns the first replicate, from this one on, that has rays of a source, and the numbers of the first of them and past the last; `None`
+/// where none has. A source of fewer rays than replicates is in some alone, which may be none of those that are asked.
+fn replicate_with_rays(plan: &Plan, source: usize, replicate: u32) -> Option<(u32, [u64; 2])> {
+    let [from, to] = plan.range(source, replicate);
+    if from < to {
+        return Some((replicate, [from, to]));
+    }
+    // Its next ray, if that is one of this source.
+    let (_, next) = plan.locate(from).filter(|(owner, _)| *owner == source)?;
+    Some((next, plan.range(source, next)))
 }
 
 /// Returns the same ray from one glue distance farther on, leaving no face.
@@ -175,7 +185,7 @@ pub(super) fn start_clear_of_faces(context: &Context<'_>, ray: &Ray) -> Option<C
     let into_opaque = enters_opaque && !leaves_opaque;
     // What shines out of a die lies glued between it and its dome. Over an edge, and between two solids of one body, nothing is entered.
     let passes = |face: &FaceOptics| {
-        let from = left.last().map_or(AMBIENT, |&body| body);
+        let from = left.last().copied().unwrap_or(AMBIENT);
         !(enters_opaque || leaves_opaque || left.contains(&face.body)) && changes_light(context, face, from)
     };
     on_solid.then(|| ClearStart {
