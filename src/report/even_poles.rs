@@ -16,9 +16,9 @@ pub(super) fn plane_rings(grid: &Grid) -> PoleRings {
     PoleRings::new(FarFieldType::C, [c.cells, gamma.cells], [c.range, gamma.range])
 }
 
-/// Whether a grid is over planes C all around, with γ from its pole on.
+/// Whether a grid is over planes C all around, with γ from its pole on, however tall its cells are there.
 pub(super) fn is_all_around(grid: &Grid) -> bool {
-    plane_rings(grid).poles()[0].is_some()
+    plane_rings(grid).reaches_poles()[0]
 }
 
 /// Returns the brightest direction of a far field with these rings in words, and how bright it is; a pole has one angle alone.
@@ -87,20 +87,20 @@ mod tests {
     use super::*;
     use crate::formats::Axis;
 
-    /// Two columns of four cells: of type B the brightest is the ring at H 90°, which has no V; of type A, whose rows have no ring there,
-    /// it is a cell.
+    /// Two columns of 15° of four cells: of type B the brightest is the ring at H 90°, which has no V; of type A, whose rows have no ring
+    /// there, it is a cell.
     #[test]
     fn a_pole_of_type_b_is_named_by_h_alone() {
         let axis = |label: &str, range, cells| Axis { label: label.into(), unit: "deg".into(), range, cells };
         let (name, quantity, unit) = ("far".to_owned(), String::new(), "cd".to_owned());
-        let axes = [axis("H", [0.0, 90.0], 2), axis("V", [-80.0, 80.0], 4)];
+        let axes = [axis("H", [60.0, 90.0], 2), axis("V", [-80.0, 80.0], 4)];
         let values = vec![1.0, 2.0, 1.0, 2.0, 1.0, 6.0, 1.0, 2.0];
         let grid = Grid { name, quantity, unit, axes, values, error: None, geometric: None, layers: Vec::new() };
         let named = |angles| {
-            let rings = PoleRings::new(angles, [2, 4], [[0.0, 90.0], [-90.0, 90.0]]);
+            let rings = PoleRings::new(angles, [2, 4], [[60.0, 90.0], [-90.0, 90.0]]);
             brightest_direction(&with_even_poles(&grid, &rings), &rings).unwrap()
         };
         assert_eq!(named(FarFieldType::B), ("H 90°".to_owned(), 3.0));
-        assert_eq!(named(FarFieldType::A), ("H 67.5°, V 20°".to_owned(), 6.0));
+        assert_eq!(named(FarFieldType::A), ("H 82.5°, V 20°".to_owned(), 6.0));
     }
 }

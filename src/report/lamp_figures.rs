@@ -1,6 +1,6 @@
 //! Figures of a lamp in the words of the trade: Imax, HV, widths at half, flux and efficiency; where the light of a spot lies.
 
-use super::even_poles::{brightest_direction, direction_text, is_all_around};
+use super::even_poles::{brightest_direction, direction_text, is_all_around, plane_rings};
 use super::half_width::half_width;
 use super::maps::peak_error;
 use super::peak_lines::{Line, lines_through_peak};
@@ -119,8 +119,9 @@ fn value_ahead(grid: &Grid) -> Option<[Cell; 2]> {
     let mut meeting: Vec<usize> =
         rows.iter().flat_map(|j| columns.iter().map(move |i| j * grid.axes[0].cells + i)).collect();
     if is_all_around(grid) {
-        // The cells at the pole are one.
-        meeting.truncate(1);
+        // All cells about γ 0 meet there; those of a pole are one.
+        let distinct = if plane_rings(grid).poles()[0].is_some() { 1 } else { grid.axes[0].cells };
+        meeting = (0..distinct).collect();
     }
     let mean = |values: &[f64]| meeting.iter().map(|&k| values[k]).sum::<f64>() / meeting.len() as f64;
     let error = grid.error.as_ref().map(|errors| {
@@ -202,7 +203,7 @@ mod tests {
     use crate::model::Model;
     use crate::regulation::{Aim, Reading, Regulation, RowKind, RowVerdict, Traffic, Verdict};
     use crate::report::chart::Content;
-    use crate::report::even_poles::{plane_rings, with_even_poles};
+    use crate::report::even_poles::with_even_poles;
     use crate::simulate::{RunSettings, Scene, simulate};
     use std::f64::consts::PI;
     use std::path::Path;
@@ -249,6 +250,11 @@ mod tests {
         };
         assert!(value_ahead(&grid("C", 90.0)).is_none());
         assert!(value_ahead(&grid("C", 360.0)).is_some() && value_ahead(&grid("H", 90.0)).is_some());
+        // Of cells too tall for one direction the mean of all that meet ahead.
+        let mut tall = grid("C", 360.0);
+        tall.values[2] = 9.0;
+        let Some([Cell::Number(ahead, _), _]) = value_ahead(&tall) else { panic!("a value ahead") };
+        assert_eq!(ahead, 3.0);
     }
 
     /// For left-hand traffic the tables are read in a mirror, and here the lamp was aimed 0.5° aside and 0.25° up.

@@ -1,6 +1,6 @@
 //! Lines of cells through the brightest one: along both axes of a grid, or in planes C of one that is all around.
 
-use super::even_poles::is_all_around;
+use super::even_poles::{is_all_around, plane_rings};
 use super::number::with_unit;
 use crate::formats::Grid;
 use crate::math::error_of_mean;
@@ -21,7 +21,7 @@ pub(super) struct Line {
     pub cells: Vec<[usize; 2]>,
     /// Where they lie on its axis; γ is negative on the far side of its pole.
     pub positions: Vec<f64>,
-    /// Whether it runs through the brightest cell: the plane across that of the peak does at the pole alone.
+    /// Whether it runs through the brightest cell: the plane across that of the peak does at a pole alone.
     pub has_peak: bool,
 }
 
@@ -78,6 +78,8 @@ pub(super) fn lines_through_peak(grid: &Grid) -> Option<[Line; 2]> {
         let column = (0..b.cells).map(|j| j * a.cells + i).collect();
         return Some([line([a, b], j, row), line([b, a], i, column)]);
     }
+    // All planes have the cells at a pole.
+    let is_at_pole = plane_rings(grid).poles().contains(&Some(j));
     let gammas = (0..b.cells).map(|j| b.center(j));
     let half_plane = |quarters: usize| {
         let columns = turned_columns(a.cells, i, quarters);
@@ -92,8 +94,7 @@ pub(super) fn lines_through_peak(grid: &Grid) -> Option<[Line; 2]> {
             step: b.step(),
             cells: half_plane(quarters + 2).rev().chain(half_plane(quarters)).collect(),
             positions: gammas.clone().rev().map(|gamma| -gamma).chain(gammas.clone()).collect(),
-            // All planes have the cells at the pole.
-            has_peak: quarters == 0 || j == 0,
+            has_peak: quarters == 0 || is_at_pole,
         }
     };
     Some([plane(0), plane(1)])
@@ -104,26 +105,27 @@ mod tests {
     use super::*;
     use crate::formats::Axis;
 
-    /// Five planes of 72° with their own numbers for values, two cells of γ, and a peak of 100 in one cell.
-    fn five_planes(peak: usize) -> Grid {
+    /// Five planes of 72° with their own numbers for values, so many cells of γ, and a peak of 100 in one cell.
+    fn five_planes(rows: usize, peak: usize) -> Grid {
         let axis = |label: &str, end: f64, cells| Axis {
             label: label.into(),
             unit: "deg".into(),
             range: [0.0, end],
             cells,
         };
-        let axes = [axis("C", 360.0, 5), axis("gamma", 180.0, 2)];
-        let values = (0..10).map(|k| if k == peak { 100.0 } else { (k % 5) as f64 }).collect();
+        let axes = [axis("C", 360.0, 5), axis("gamma", 180.0, rows)];
+        let values = (0..5 * rows).map(|k| if k == peak { 100.0 } else { (k % 5) as f64 }).collect();
         let (name, quantity, unit) = ("far".to_owned(), String::new(), "cd".to_owned());
-        let error = Some(vec![0.3; 10]);
-        Grid { name, quantity, unit, axes, values, error, geometric: Some(vec![0.4; 10]), layers: Vec::new() }
+        let error = Some(vec![0.3; 5 * rows]);
+        let geometric = Some(vec![0.4; 5 * rows]);
+        Grid { name, quantity, unit, axes, values, error, geometric, layers: Vec::new() }
     }
 
     /// Opposite the plane at C 36° lies the edge at 216° between those at 180° and 252°; across it the directions 126° and 306° lie in the
     /// planes from 72° and from 288° on.
     #[test]
     fn an_odd_number_of_planes_has_edges_opposite() {
-        let grid = five_planes(5);
+        let grid = five_planes(2, 5);
         let lines = lines_through_peak(&grid).unwrap();
         let values = lines.each_ref().map(|line| (0..4).map(|k| line.value(&grid, k)).collect::<Vec<_>>());
         assert_eq!(values, [vec![2.5, 2.5, 0.0, 100.0], vec![4.0, 4.0, 1.0, 1.0]]);
@@ -136,9 +138,10 @@ mod tests {
 
     #[test]
     fn the_plane_across_has_the_peak_at_the_pole_alone() {
-        for (peak, has_peak) in [(7, [true, false]), (2, [true, true])] {
-            let lines = lines_through_peak(&five_planes(peak)).unwrap();
-            assert_eq!(lines.map(|line| line.has_peak), has_peak, "cell {peak}");
+        // In twelve rows at γ 0, beside it and at γ 180°; two are too tall for one direction.
+        for (rows, peak, is_at_pole) in [(12, 2, true), (12, 7, false), (12, 57, true), (2, 2, false)] {
+            let lines = lines_through_peak(&five_planes(rows, peak)).unwrap();
+            assert_eq!(lines.map(|line| line.has_peak), [true, is_at_pole], "cell {peak} of {rows} rows");
         }
     }
 

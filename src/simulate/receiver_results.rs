@@ -246,10 +246,10 @@ impl ReceiverResult {
     }
 
     /// Returns the cells and their errors with each ring of cells at a pole at its mean: these are slivers of one direction. Poles are γ 0°
-    /// and 180° of planes C all around, V ±90° of type A and of spheres and H ±90° of type B over half a turn or more. Beside a pole
-    /// neighbours of a ring whose standard errors are above 3 % of them are joined to their mean too, at most as many as have the solid
-    /// angle of a cell on the equator together. The error of joined cells stands at the last of them; the others, which are no rivals of
-    /// it, have none.
+    /// and 180° of planes C all around, V ±90° of type A and of spheres and H ±90° of type B over half a turn or more. Beside a pole, and
+    /// at one where cells are taller than 15°, neighbours of a ring whose standard errors are above 3 % of them are joined to their mean
+    /// too, at most as many as have the solid angle of a cell on the equator together. The error of joined cells stands at the last of
+    /// them; the others, which are no rivals of it, have none.
     pub fn cells_with_even_poles(&self) -> [Cow<'_, [f64]>; 2] {
         let mut even = [Cow::Borrowed(self.cells.as_slice()), Cow::Borrowed(self.errors.as_slice())];
         let rings = self.pole_rings();
