@@ -54,6 +54,8 @@ pub(super) fn lamp_table(counted: &Counted<'_>, results: &Results, assessment: O
     );
     let rings = receiver.pole_rings();
     if let Some((place, value)) = brightest_direction(grid, &rings) {
+        // Nothing is brightest in the dark.
+        let place = if value > 0.0 { place } else { String::new() };
         let [value, error] = Cell::with_error(value, peak_error(grid, &rings, of_receiver.max.as_ref()), 5);
         table.row(["Imax".into(), value, error, "cd".into(), place.into()]);
     }
@@ -68,6 +70,9 @@ pub(super) fn lamp_table(counted: &Counted<'_>, results: &Results, assessment: O
     table.row(["efficiency".into(), value, error, "%".into(), whole.into()]);
     for line in lines_through_peak(grid).iter().flatten().filter(|line| line.has_peak) {
         let [width, error] = width_along(grid, line);
+        if width == Cell::Empty {
+            continue;
+        }
         table.row([
             format!("width at half, {}", line.name).into(),
             width,

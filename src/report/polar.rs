@@ -122,10 +122,10 @@ fn half_plane(grid: &Grid, angle_deg: f64) -> Vec<(f64, f64)> {
 }
 
 /// Draws the polar diagram of a luminaire: intensities over γ in the planes C 0–180 and C 90–270; `None` for a grid that is not over
-/// C-planes all around, and a dark one.
+/// C-planes all around, and one that is dark in these planes.
 pub(super) fn polar(receiver: &str, grid: &Grid) -> Option<Chart> {
     // The diagram needs the whole turn.
-    if !is_all_around(grid) || grid.values.iter().all(|value| *value <= 0.0) {
+    if !is_all_around(grid) {
         return None;
     }
     let plane = |name: &str, right_deg: f64| {
@@ -144,7 +144,9 @@ pub(super) fn polar(receiver: &str, grid: &Grid) -> Option<Chart> {
         Series { name: name.into(), points, labels, style: SeriesStyle::Line, ..Series::default() }
     };
     let series = vec![plane("C 0–180", 0.0), plane("C 90–270", 90.0)];
-    Some(Chart {
+    // Circles need light, which may all lie in other planes.
+    let is_lit = series.iter().flat_map(|s| &s.points).any(|[x, y]| x.hypot(*y) > 0.0);
+    is_lit.then(|| Chart {
         name: format!("{}-polar", file_stem(receiver)),
         title: format!("{receiver}: polar diagram"),
         caption: "The distance of the curve from the centre is the intensity in its direction, by the circles; the spokes are γ, of which \
@@ -201,5 +203,7 @@ mod tests {
         let (whole, unit) = frame(|_| 1.0);
         assert_eq!(whole.labels(&unit).len(), 5 + 12);
         assert!(polar("dark", &grid(120, 60, |_, _| 0.0)).is_none());
+        let aside = grid(72, 36, |c, gamma| if c == 9 && (0.7..0.8).contains(&gamma) { 500.0 } else { 0.0 });
+        assert!(polar("aside", &aside).is_none(), "all light is in C 47.5°");
     }
 }

@@ -486,20 +486,25 @@ fn an_angle_of_type_a_or_b_all_around_has_no_mean() {
     assert!(behind["centroid"][0].is_number() && behind["rms"][1].is_number(), "{behind}");
 }
 
-/// A beam aside passes one of two planes across each other, one about the pole both.
+/// A beam aside passes one of two planes across each other, one about the pole both. Against the normal planes end within the beam.
 #[test]
 fn the_width_at_half_is_told_in_planes_that_have_the_peak() {
-    for (direction, widths) in [("[-0.3, 0.1, 1]", 1), ("[0, 0, 1]", 2)] {
+    for (direction, widths) in [("[-0.3, 0.1, 1]", 1), ("[0, 0, 1]", 2), ("[0, 0, -1]", 0)] {
         let folder = tempfile::tempdir().unwrap();
         let scene = format!(
             "[run]\nrays = 20_000\nunit = 'lm'\n[[source]]\nkind = 'cosine'\nexponent = 200\ndirection = {direction}\n\
-            [[receiver]]\nname = 'far'\nkind = 'far_field'\nangles = 'C'\ncells = [36, 36]\n"
+            [[receiver]]\nname = 'far'\nkind = 'far_field'\nangles = 'C'\ncells = [36, 36]\n\
+            [[receiver]]\nname = 'half'\nkind = 'far_field'\nangles = 'C'\nv_deg = [0, 90]\ncells = [36, 18]\n"
         );
         std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
         let (code, _, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "out", "-q"]);
         assert_eq!(code, 0, "{err}");
         let table = std::fs::read_to_string(folder.path().join("out/tables/far-lamp.csv")).unwrap();
         assert_eq!(table.matches("width at half").count(), widths, "{table}");
+        // What is dark is brightest nowhere.
+        let half = std::fs::read_to_string(folder.path().join("out/tables/half-lamp.csv")).unwrap();
+        let brightest = half.lines().find(|line| line.starts_with("Imax,")).unwrap();
+        assert_eq!(brightest.starts_with("Imax,0,") && brightest.ends_with(",cd,"), widths == 0, "{half}");
     }
 }
 
