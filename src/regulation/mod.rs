@@ -42,5 +42,6 @@ pub use judgement::{Settles, Verdict};
 pub use map::{IntensityMap, Reading};
 pub(crate) use read::even_edges;
 pub use row::{Bound, Row, RowKind};
+pub(crate) use table::plain;
 pub use table::{Function, Regulation, Traffic};
 pub use verdict::assess;

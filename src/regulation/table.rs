@@ -143,7 +143,7 @@ const MOST_NAMED: usize = 12;
 const EXAMPLES: [&str; 4] = ["UN R112 B passing", "UN R149-01 C passing", "UN R148-01 stop-S1", "FMVSS 108 LB2V"];
 
 /// A name in small letters, without spaces and dashes, which are written in many ways.
-fn plain(name: &str) -> String {
+pub(crate) fn plain(name: &str) -> String {
     name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
 }
 

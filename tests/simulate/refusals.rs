@@ -420,6 +420,8 @@ fn a_regulation_that_stands_twice_is_refused() {
     let once = "[[regulation]]\nid = 'UN R112 B passing'\n";
     let read = |regulations: &str| Scene::parse(&format!("{head}{regulations}"), "scene.toml", Path::new("."));
     assert!(read(once).is_ok() && read(&format!("{once}{once}left_hand = true\n")).is_ok());
-    let error = read(&once.repeat(2)).unwrap_err().to_string();
-    assert!(error.contains("stands above already"), "{error}");
+    for twice in [once.repeat(2), format!("{once}[[regulation]]\nid = 'un r112  B passing'\nreceiver = 'road'\n")] {
+        let error = read(&twice).unwrap_err().to_string();
+        assert!(error.contains("stands above already"), "{error}");
+    }
 }

@@ -26,9 +26,13 @@ pub(super) fn unsettled_sentence(document: &Value) -> Option<String> {
     let (beyond, within): (Vec<&Value>, Vec<&Value>) = rows.partition(|row| row["unseen"] != 0);
     let mut reasons = Vec::new();
     if !within.is_empty() {
-        // On the true surfaces there is nothing to take away.
-        let is_exact = within.iter().all(|row| row["geometric"] == 0.0);
-        let facets = if is_exact { "" } else { ", or by the facets, whose errors --intersector exact takes away" };
+        // On the true surfaces, where lost light alone is such an error, there is nothing to take away.
+        let is_on_spline = document["tolerance_mm"].is_null();
+        let facets = if is_on_spline || within.iter().all(|row| row["geometric"] == 0.0) {
+            ""
+        } else {
+            ", or by the facets, whose errors --intersector exact takes away"
+        };
         reasons.push(format!(
             "{} unsure at the most rays{facets}; the column 'settled by' says what would do",
             count_of(within.len() as u64, "row")
@@ -66,11 +70,14 @@ mod tests {
 
     #[test]
     fn what_was_done_already_is_no_advice() {
-        let said = |geometric: f64| {
+        let said = |geometric: f64, tolerance_mm: Option<[f64; 2]>| {
             let row = json!({"verdict": "unsure", "unseen": 0, "geometric": geometric});
-            unsettled_sentence(&json!({"regulations": [{"rows": [row]}]})).unwrap()
+            unsettled_sentence(&json!({"regulations": [{"rows": [row]}], "tolerance_mm": tolerance_mm})).unwrap()
         };
-        assert!(said(0.1).contains("--intersector exact"));
-        assert!(said(0.0).contains("1 row unsure") && !said(0.0).contains("--intersector"));
+        let facets = Some([0.05, 0.2]);
+        assert!(said(0.1, facets).contains("--intersector exact"));
+        for done in [said(0.0, facets), said(0.1, None)] {
+            assert!(done.contains("1 row unsure") && !done.contains("--intersector"), "{done}");
+        }
     }
 }

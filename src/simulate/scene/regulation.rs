@@ -1,7 +1,7 @@
 //! The key `[[regulation]]`: by which tables a far field of the run is judged.
 
 use super::{FarFieldType, Key, PowerUnit, Receiver, ReceiverKind, Scene};
-use crate::regulation::Regulation;
+use crate::regulation::{Regulation, plain};
 use crate::simulate::{Error, ErrorKind};
 use crate::text::did_you_mean;
 use serde::{Deserialize, Serialize};
@@ -48,7 +48,14 @@ impl RegulationUse {
                 return Err(scene.error(ErrorKind::Value, &at, message));
             }
         };
-        if scene.regulations[..index].contains(self) {
+        // However its name is written, and whether the only far field is named. Tables are read for names that may mean it alone.
+        let is_same = |other: &Self| {
+            (other.left_hand, other.as_placed) == (self.left_hand, self.as_placed)
+                && other.receiver_index(scene) == self.receiver_index(scene)
+                && plain(&regulation.id).starts_with(&plain(&other.id))
+                && Regulation::find(&other.id).is_ok_and(|found| found.id == regulation.id)
+        };
+        if scene.regulations[..index].iter().any(is_same) {
             let message = format!("'{}' stands above already, about the same far field", self.id);
             return fail("id", message, "leave one of them out");
         }
