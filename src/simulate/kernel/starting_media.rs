@@ -60,16 +60,21 @@ fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter, has_m
         && emitter.list().is_none()
         && context.plan.rays_of_source(source) >= PROBED_RAYS;
     let mut some_go_in = false;
+    let mut asked: Option<[u32; 2]> = None;
     for k in 0..PROBED_RAYS {
         // Over all replicates and the whole of each: they are spread over the whole of a ray list. As many where replicates are few, of
         // which each has several then: two rays would tell nothing of a source that straddles a boundary.
         let replicate = (k * u64::from(replicates) / PROBED_RAYS) as u32;
         let Some((replicate, [from, to])) = replicate_with_rays(&context.plan, source, replicate) else { continue };
+        let index = ((to - from) * k / PROBED_RAYS) as u32;
+        // One ray of few is asked once.
+        if asked.replace([replicate, index]) == Some([replicate, index]) {
+            continue;
+        }
         let s = context.settings;
         let lattice = context.plan.lattice(replicate);
         let portion = Portion { replicate, source: source as u32, rays: to - from, lattice };
         let mut ray = Ray::new(Point::ZERO, Vector::Z);
-        let index = ((to - from) * k / PROBED_RAYS) as u32;
         match &mut sampler {
             Some(sampler) => sampler.restart(emitter, portion, from),
             None => sampler = Some(RaySampler::new(emitter, s.seed, s.sampling, portion, from)),
