@@ -206,8 +206,17 @@ pub(super) fn channel_table(
     table
 }
 
+/// Writes a figure that has its receiver before it, with the axis of places and widths: `focus: rms x` for `focus: rms_1`.
+fn figure_of_receiver(results: &Results, named: &str) -> String {
+    let of_receiver = named.rsplit_once(": ").and_then(|(receiver, name)| {
+        let r = results.receivers.iter().find(|r| r.name == receiver)?;
+        Some(format!("{receiver}: {}", figure_name(r, name)))
+    });
+    of_receiver.unwrap_or_else(|| figure_in_words(named))
+}
+
 /// Makes a table of the ways that a pilot tried before the run was chosen to be traced so, each with the figure it gets most wrong.
-pub(super) fn alternative_table(chosen: &Chosen) -> Table {
+pub(super) fn alternative_table(chosen: &Chosen, results: &Results) -> Table {
     let columns = [
         ("intersector", ""),
         ("normals", ""),
@@ -234,7 +243,7 @@ pub(super) fn alternative_table(chosen: &Chosen) -> Table {
             tolerance(0),
             tolerance(1),
             Cell::Number(a.seconds, 3),
-            figure_in_words(&a.figure).into(),
+            figure_of_receiver(results, &a.figure).into(),
             a.geometric_share.map_or_else(|| "–".into(), |share| Cell::Number(100.0 * share, 2)),
             Cell::Number(a.geometric_to_statistical, 2),
         ]);

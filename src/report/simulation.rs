@@ -296,7 +296,8 @@ impl SimulationReport<'_> {
         };
         let measured = self.geometric.filter(|g| g.rays > 0);
         let measured = measured.map(|g| error_tables::change_table(g, self.results, self.unit)).into_iter();
-        let tried = self.chosen.filter(|c| !c.alternatives.is_empty()).map(error_tables::alternative_table);
+        let tried = self.chosen.filter(|c| !c.alternatives.is_empty());
+        let tried = tried.map(|c| error_tables::alternative_table(c, self.results));
         let section = measured.chain(tried).fold(section, |s, table| s.with_block(table));
         if self.results.receivers.iter().any(|r| !r.channels.is_empty()) {
             section.with_block(error_tables::channel_table(self.results, self.figures, self.unit, cause))
