@@ -8,11 +8,20 @@ use crate::simulate::{Absorbed, Results};
 use crate::study::default_accuracy::Chosen;
 use crate::study::figures::{ChannelFigure, Figure, Limit, ReceiverFigures, halving};
 use crate::study::geometric_error::{GeometricError, Paired, ReceiverError};
+use crate::study::model_figures::PowerFigures;
 use crate::text::{figures, grouped};
 
+/// Share of a value below which its error is that of rounding, and nothing to tell people.
+const ROUNDING_SHARE: f64 = 1e-9;
+
+/// Whether an error is no more than what rounding leaves of a value.
+fn is_rounding(value: f64, error: f64) -> bool {
+    error <= ROUNDING_SHARE * value.abs()
+}
+
 /// Writes a figure of `digits` significant digits with its unit and one ± (1σ) for both errors. Both are named where the geometric one,
-/// by its `cause`, exceeds a tenth of the rays', the rays' alone where the facets were not judged. A 0 that no ray reached gets its limit
-/// of 95 % instead, no more than `most` where a most is known.
+/// by its `cause`, exceeds a tenth of the rays', the rays' alone where the facets were not judged; none that is of rounding. A 0 that no
+/// ray reached gets its limit of 95 % instead, no more than `most` where a most is known.
 pub(super) fn with_errors(figure: &Figure, digits: usize, cause: GeometricCause, most: Option<f64>) -> String {
     let Figure { value, unit, statistical, geometric, .. } = figure;
     // One ray is stated as the error where none arrived: three of them are the limit of 95 %.
@@ -22,18 +31,27 @@ pub(super) fn with_errors(figure: &Figure, digits: usize, cause: GeometricCause,
         return format!("{} (no ray arrived: at most {most}, 95 %)", with_unit("0", unit));
     }
     let value = known_figures(*value, figure.combined(), digits);
+    let is_rounded = is_rounding(figure.value, figure.combined());
     let Some(geometric) = geometric else {
-        let of_rays = error_figures(*statistical);
-        return format!(
-            "{} (± {of_rays} from the rays alone; the facets were not judged)",
-            with_unit(&value, unit)
-        );
+        let of_rays = if is_rounded {
+            String::new()
+        } else {
+            format!("± {} from the rays alone; ", error_figures(*statistical))
+        };
+        return format!("{} ({of_rays}the facets were not judged)", with_unit(&value, unit));
     };
+    if is_rounded {
+        return with_unit(&value, unit);
+    }
     let told = with_unit(&format!("{value} ± {}", error_figures(figure.combined())), unit);
     // Below a tenth of the statistical error the facets change the sum by half a percent.
     if *geometric > 0.1 * statistical {
-        let [of_rays, others] = [*statistical, *geometric].map(error_figures);
-        return format!("{told} (± {of_rays} from the rays, ± {others} from {})", cause.in_words());
+        let of_rays = if is_rounding(figure.value, *statistical) {
+            String::new()
+        } else {
+            format!("± {} from the rays, ", error_figures(*statistical))
+        };
+        return format!("{told} ({of_rays}± {} from {})", error_figures(*geometric), cause.in_words());
     }
     told
 }
@@ -140,20 +158,39 @@ fn absorbed_sentence(error: &GeometricError, absorbed: &Absorbed, figure: &Figur
     }
 }
 
-/// Writes the seconds that halving the statistical error takes at most, and where `error` tells, a run at half the tolerance or on the
-/// spline.
-pub(super) fn halving_cost(results: &Results, error: Option<&GeometricError>) -> String {
+/// Whether rays leave nothing open of the powers, the channels and the brightest places: their errors are those of rounding.
+fn are_all_rounded(results: &Results, all: &[ReceiverFigures], power: &PowerFigures) -> bool {
+    let sums = [&power.received, &power.escaped, &power.cut_off].into_iter().chain(&power.by_body);
+    let mut powers = sums.chain(all.iter().map(|f| &f.power));
+    let channels = all.iter().flat_map(|f| &f.channels).map(|channel| &channel.figure);
+    let mut others = all.iter().filter_map(|f| f.max.as_ref()).chain(channels);
+    let rounding = results.rounding();
+    powers.all(|f| f.statistical <= rounding || is_rounding(f.value, f.statistical))
+        && others.all(|f| is_rounding(f.value, f.statistical))
+}
+
+/// Writes the seconds that halving the statistical error takes at most, unless that is all rounding, and where `error` tells, a run at half
+/// the tolerance or on the spline; empty where nothing is to be halved. `all` is of the receivers, `power` of where the power went.
+pub(super) fn halving_cost(
+    results: &Results,
+    error: Option<&GeometricError>,
+    all: &[ReceiverFigures],
+    power: &PowerFigures,
+) -> String {
     let cost = halving(results, error);
-    let mut text =
-        format!("To halve the statistical errors takes at most {} more", seconds(cost.statistical_seconds));
+    let mut text = String::new();
+    if !are_all_rounded(results, all, power) {
+        let more = seconds(cost.statistical_seconds);
+        text += &format!("To halve the statistical errors takes at most {more} more. ");
+    }
     if let (Some(finer), Some(spline)) = (cost.geometric_seconds, cost.spline_seconds) {
         text += &format!(
-            ". A run at half the tolerance, which halves the errors from the facets, takes about {}; one on the spline, which has none, about {}",
+            "A run at half the tolerance, which halves the errors from the facets, takes about {}; one on the spline, which has none, about {}. ",
             seconds(finer),
             seconds(spline)
         );
     }
-    text + ". "
+    text
 }
 
 /// Writes what the run was traced on, the facets' tolerance in mm, and why it was chosen.
@@ -188,6 +225,18 @@ mod tests {
         assert!(lossy.ends_with("± 0.4 from lost light)"), "{lossy}");
         assert_eq!(told("", 0.0, None), "0 (no ray arrived: at most 0.9, 95 %)");
         assert_eq!(told("", 135.1, None), "135.1 (± 0.3 from the rays alone; the facets were not judged)");
+    }
+
+    /// What whole quanta leave open of a power that all light brings is nothing that a reader could use.
+    #[test]
+    fn an_error_of_rounding_is_not_told() {
+        let told = |value: f64, statistical: f64, geometric: Option<f64>| {
+            with_errors(&Figure::new(value, "W", statistical, geometric), 4, GeometricCause::Facets, None)
+        };
+        assert_eq!(told(1.0, 2.1e-12, Some(0.0)), "1 W");
+        assert_eq!(told(1.0, 2.1e-12, None), "1 W (the facets were not judged)");
+        assert_eq!(told(0.0, 0.0, Some(0.0)), "0 W");
+        assert_eq!(told(1.0, 2.1e-12, Some(0.1)), "1 ± 0.1 W (± 0.1 from the facets)");
     }
 
     /// Where all light was lost, an error of all that was emitted, three times that is no bound: no more than all can arrive.

@@ -289,11 +289,9 @@ impl SimulationReport<'_> {
         let receivers = error_tables::receiver_table(self.results, self.figures, self.unit);
         let section = Section::new("Energy").with_block(power).with_block(receivers);
         let section = section.with_block(error_tables::figure_table(self.results, self.figures, cause));
-        let section = if self.is_mostly_lost() {
-            section
-        } else {
-            section.with_block(errors::halving_cost(self.results, self.geometric).as_str())
-        };
+        let halving = errors::halving_cost(self.results, self.geometric, self.figures, self.power);
+        let section =
+            if self.is_mostly_lost() || halving.is_empty() { section } else { section.with_block(halving) };
         let measured = self.geometric.filter(|g| g.rays > 0);
         let measured = measured.map(|g| error_tables::change_table(g, self.results, self.unit)).into_iter();
         let tried = self.chosen.filter(|c| !c.alternatives.is_empty());
