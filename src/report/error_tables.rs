@@ -290,3 +290,33 @@ pub(super) fn change_table(error: &GeometricError, results: &Results, unit: &str
     }
     table
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::intersect::octree::{self, Octree};
+    use crate::mesh::FacetMesh;
+    use crate::model::Model;
+    use crate::simulate::{RunSettings, Scene, simulate};
+    use std::path::Path;
+
+    #[test]
+    fn a_figure_of_a_receiver_has_its_axis() {
+        let text = "[run]\nrays = 64\n[[source]]\nkind = 'point'\n[[receiver]]\nname = 'wall'\nat = [0, 0, 5]\nsize = [4, 4]\n\
+            [[receiver]]\nname = 'far'\nkind = 'far_field'\nangles = 'C'\n";
+        let scene = Scene::parse(text, "wall.toml", Path::new(".")).unwrap();
+        let bound = scene.bind(&Model::default()).unwrap();
+        let mesh = FacetMesh::default();
+        let nothing = Octree::build(&mesh, &octree::Settings::default());
+        let results = simulate(&bound, &nothing, &RunSettings::from(&scene.run), &|_| true);
+        for (named, told) in [
+            ("wall: rms_1", "wall: rms x"),
+            ("far: centroid_2", "far: mean position γ"),
+            ("wall: max", "wall: max"),
+            ("all light: received", "all light: received"),
+            ("", ""),
+        ] {
+            assert_eq!(figure_of_receiver(&results, named), told);
+        }
+    }
+}
