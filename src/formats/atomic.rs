@@ -217,7 +217,8 @@ mod tests {
         let at = |name: &str| folder.path().join(name);
         let this = Writer::this().to_string();
         let dead = this.replace(&format!(".{}", std::process::id()), ".4294967295");
-        let own = format!(".a.csv.{this}-7.part");
+        // No write of the tests beside this one is ever of that number.
+        let own = format!(".a.csv.{this}-999999999.part");
         let elsewhere = ".a.csv.00000000.4294967295-0.part";
         let other = format!(".b.csv.{dead}-0.part");
         for name in
