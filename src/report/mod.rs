@@ -65,8 +65,5 @@ pub use provenance::Provenance;
 pub use simulation::{SimulationReport, path_lines};
 pub use studies::study_report;
 pub use table::{Cell, Column, Table};
-pub use verdicts::{
-    direction_text, judged_note, requirement_text, settling_text, traffic_sentence, verdict_counts,
-    verdict_sentence,
-};
+pub use verdicts::{judged_note, traffic_sentence, verdict_cells, verdict_counts, verdict_sentence};
 pub use view::{Shape, View};

@@ -33,7 +33,7 @@ pub fn traffic_sentence(a: &Assessment) -> &'static str {
 }
 
 /// Writes what is asked of a row, cd; in words, or a dash, where it has no limit.
-pub fn requirement_text(row: &RowVerdict) -> String {
+fn requirement_text(row: &RowVerdict) -> String {
     let number = |x: f64| figures(x, DIGITS);
     match (row.row.min, row.row.max) {
         (Some(min), Some(max)) => format!("{} … {}", number(min), number(max)),
@@ -56,7 +56,7 @@ pub(super) fn multiple_text(row: &Row) -> Option<String> {
 }
 
 /// Writes a direction, degrees, as the tables do: `3.43L 0.57U`.
-pub fn direction_text([h, v]: [f64; 2]) -> String {
+fn direction_text([h, v]: [f64; 2]) -> String {
     let side = |x: f64, positive: char, negative: char| match without_rounding(x) {
         x if x > 0.0 => format!("{}{positive}", figures(x, 3)),
         x if x < 0.0 => format!("{}{negative}", figures(-x, 3)),
@@ -66,7 +66,7 @@ pub fn direction_text([h, v]: [f64; 2]) -> String {
 }
 
 /// Writes what would settle an unsure row; nothing for any other.
-pub fn settling_text(row: &RowVerdict) -> String {
+fn settling_text(row: &RowVerdict) -> String {
     if row.verdict == Some(Verdict::Unsure) && row.unseen > 0 {
         return "a wider far field".into();
     }
@@ -123,6 +123,23 @@ fn section(a: &Assessment, grid: &Grid, number: usize) -> Section {
         .with_block(road::from_driver(&name, grid, aim))
 }
 
+/// Makes the cells of a row: its name, verdict and limit, what is read and its errors by rays, facets and cells, where, and what settles
+/// it; a dash where nothing was read.
+pub fn verdict_cells(row: &RowVerdict) -> [Cell; 9] {
+    let reading = |cell: fn(&Reading) -> Cell| row.reading.as_ref().map_or(Cell::Empty, cell);
+    [
+        row.row.id.as_str().into(),
+        row.verdict.map_or("not judged".to_owned(), |v| v.to_string()).into(),
+        requirement_text(row).into(),
+        reading(|r| Cell::Known(r.value, r.known_error().hypot(r.cells), DIGITS)),
+        reading(|r| Cell::Error(r.statistical)),
+        reading(|r| r.geometric.map_or(Cell::Empty, Cell::Error)),
+        reading(|r| Cell::Error(r.cells)),
+        row.direction.map_or(String::new(), direction_text).into(),
+        settling_text(row).into(),
+    ]
+}
+
 /// Makes a table of the rows of an assessment: what is asked and read, both errors, and the verdict. `name` begins the name of its file.
 fn table(a: &Assessment, name: &str) -> Table {
     let columns = [
@@ -142,19 +159,7 @@ fn table(a: &Assessment, name: &str) -> Table {
         of the table after aiming.";
     let mut table = Table::new(&format!("{name}-verdict"), &a.regulation.function.name, &columns).caption(caption);
     for row in &a.rows {
-        let reading = |cell: fn(&Reading) -> Cell| row.reading.as_ref().map_or(Cell::Empty, cell);
-        table.row([
-            row.row.id.as_str().into(),
-            row.verdict.map_or("not judged".to_owned(), |v| v.to_string()).into(),
-            requirement_text(row).into(),
-            reading(|r| Cell::Known(r.value, r.known_error().hypot(r.cells), DIGITS)),
-            reading(|r| Cell::Error(r.statistical)),
-            reading(|r| r.geometric.map_or(Cell::Empty, Cell::Error)),
-            reading(|r| Cell::Error(r.cells)),
-            row.direction.map_or(String::new(), direction_text).into(),
-            settling_text(row).into(),
-            judged_note(row).unwrap_or("").into(),
-        ]);
+        table.row(verdict_cells(row).into_iter().chain([judged_note(row).unwrap_or("").into()]));
     }
     table
 }

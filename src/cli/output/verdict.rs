@@ -2,13 +2,8 @@
 
 use super::sentences::sentence_lines;
 use super::terminal_tables::table_text;
-use crate::regulation::{Assessment, Reading, RowVerdict};
-use crate::report::{
-    Cell, Table, direction_text, judged_note, requirement_text, settling_text, traffic_sentence, verdict_counts,
-};
-
-/// Significant digits of intensities: more than any photometer has.
-const DIGITS: usize = 5;
+use crate::regulation::Assessment;
+use crate::report::{Table, judged_note, traffic_sentence, verdict_cells, verdict_counts};
 
 /// Columns of the table, with their units.
 const COLUMNS: [(&str, &str); 9] = [
@@ -36,7 +31,7 @@ pub(crate) fn summary(a: &Assessment, width: usize, bold: impl Fn(&str) -> Strin
     }
     let mut table = Table::new("verdict", "", &COLUMNS);
     for row in &a.rows {
-        table.row(row_cells(row));
+        table.row(verdict_cells(row));
     }
     let counts = verdict_counts(a);
     let unjudged = a.rows.len() - counts.iter().sum::<usize>();
@@ -64,26 +59,11 @@ fn notes(a: &Assessment) -> Vec<(&str, Vec<&str>)> {
     notes
 }
 
-/// Returns the cells of a row of the table; a dash where nothing was read.
-fn row_cells(row: &RowVerdict) -> [Cell; COLUMNS.len()] {
-    let reading = |cell: fn(&Reading) -> Cell| row.reading.as_ref().map_or(Cell::Empty, cell);
-    [
-        row.row.id.as_str().into(),
-        row.verdict.map_or("not judged".to_owned(), |v| v.to_string()).into(),
-        requirement_text(row).into(),
-        reading(|r| Cell::Known(r.value, r.known_error().hypot(r.cells), DIGITS)),
-        reading(|r| Cell::Error(r.statistical)),
-        reading(|r| r.geometric.map_or(Cell::Empty, Cell::Error)),
-        reading(|r| Cell::Error(r.cells)),
-        row.direction.map_or(String::new(), direction_text).into(),
-        settling_text(row).into(),
-    ]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::regulation::{Aim, Regulation, Traffic, Verdict};
+    use crate::regulation::{Aim, Regulation, RowVerdict, Traffic, Verdict};
+    use crate::report::Cell;
 
     /// The tables of a brake light remark one thing on two of its groups; neither is in need of being settled.
     #[test]
@@ -98,7 +78,7 @@ mod tests {
             notes.iter().any(|(note, rows)| note.starts_with("as printed") && rows[..] == ["Group 1", "Group 5"]),
             "{notes:?}"
         );
-        assert!(a.rows.iter().all(|row| row_cells(row)[8] == Cell::Text(String::new())));
+        assert!(a.rows.iter().all(|row| verdict_cells(row)[8] == Cell::Text(String::new())));
     }
 
     fn passed(row: crate::regulation::Row) -> RowVerdict {

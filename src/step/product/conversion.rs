@@ -196,31 +196,19 @@ fn add_shells(
         if !plan.void {
             part.shells.append(&mut beside);
         }
-        for RepeatedFace { id, standing } in remove_repeated_faces(&mut own, part, geometry.units) {
-            let (Some(id), Some(standing)) = (id, standing) else { continue };
-            let reason = format!("it stands where #{standing} does: it is left out");
-            out.repaired.push(repair_note(file, id, reason));
-            removed.insert(id);
-        }
-        for k in faces_against_neighbours(&own) {
-            own[k].reversed ^= true;
-            let reason =
-                "its sense contradicts its edges, which run against those of its neighbours: the edges decide";
-            out.repaired.extend(own[k].entity.map(|id| repair_note(file, id, reason.into())));
-        }
-        // Only a whole shell tells by its volume which way it faces.
-        let mut void = plan.void && outer.is_some();
+        removed.extend(mend_faces(geometry, &mut own, part, out));
+        let around = outer.filter(|_| plan.void);
         // Below a dome that was refused a void is outside of what is left.
-        let around =
-            outer.filter(|(_, is_whole)| *is_whole).filter(|_| plan.void).map(|(k, _)| &part.shells[k].faces);
-        if around.is_some_and(|around| lies_outside(&own, around)) {
-            void = false;
+        let lies_beside = around.is_some_and(|(k, is_whole)| is_whole && lies_outside(&own, &part.shells[k].faces));
+        let void = around.is_some() && !lies_beside;
+        if lies_beside {
             // Of four pipes in a row, three of them voids of the first, light lost a fifth.
             let reason = "a void lies outside of the shell that it is in: it is taken as a solid of its own";
             out.repaired.extend(plan.owners.first().map(|owner| repair_note(file, *owner, reason.into())));
         }
+        // Only a whole shell tells by its volume which way it faces.
         let whole = plan.whole && is_complete;
-        if (plan.outer || plan.void && outer.is_some()) && whole && is_inside_out(&own, void) {
+        if (plan.outer || around.is_some()) && whole && is_inside_out(&own, void) {
             own.iter_mut().for_each(|face| face.reversed ^= true);
             // Rays would enter where they should leave: one such file lost 857 of 50,000, one with a void 465 of 100,000.
             let reason =
@@ -231,7 +219,7 @@ fn add_shells(
             outer = (!own.is_empty()).then_some((part.shells.len(), whole));
         }
         if !own.is_empty() {
-            let shells = if plan.void && !void && outer.is_some() { &mut beside } else { &mut part.shells };
+            let shells = if lies_beside { &mut beside } else { &mut part.shells };
             shells.push(Shell {
                 faces: own,
                 closed: plan.closed,
@@ -248,6 +236,30 @@ fn add_shells(
         removed.remove(&id);
     }
     out.found = out.found.saturating_sub(removed.len());
+}
+
+/// Leaves out the faces of a shell that stand where others do, turns those that contradict their neighbours, and notes both in `out`.
+/// Returns the entities that it leaves out.
+fn mend_faces(
+    geometry: &GeometryReader<'_, '_>,
+    faces: &mut Vec<Face>,
+    part: &Part,
+    out: &mut ConvertedPart,
+) -> Vec<u64> {
+    let file = geometry.file;
+    let mut removed = Vec::new();
+    for RepeatedFace { id, standing } in remove_repeated_faces(faces, part, geometry.units) {
+        let (Some(id), Some(standing)) = (id, standing) else { continue };
+        let reason = format!("it stands where #{standing} does: it is left out");
+        out.repaired.push(repair_note(file, id, reason));
+        removed.push(id);
+    }
+    for k in faces_against_neighbours(faces) {
+        faces[k].reversed ^= true;
+        let reason = "its sense contradicts its edges, which run against those of its neighbours: the edges decide";
+        out.repaired.extend(faces[k].entity.map(|id| repair_note(file, id, reason.into())));
+    }
+    removed
 }
 
 /// Returns the curve of an edge, mm, or the line between two points of a loop; without one where it has no length.
