@@ -1,7 +1,7 @@
 //! The one `match` from what a scene calls for to a kernel.
 
 use super::bind::BoundScene;
-use super::effects::{KernelKind, Required};
+use super::effects::{KernelKind, RequiredEffects};
 use super::kernel::{self, Context, RaySelection, payload};
 use super::settings::{KernelChoice, RunSettings};
 use super::tallies::ReplicateTally;
@@ -15,7 +15,7 @@ pub fn kernel_name(bound: &BoundScene, settings: &RunSettings) -> &'static str {
 
 /// Returns the kernel that a run takes: the smallest that the scene needs, or a larger one where the settings ask for it.
 pub(crate) fn kernel_kind(bound: &BoundScene, settings: &RunSettings) -> KernelKind {
-    let required = Required::new(bound).kernel;
+    let required = RequiredEffects::new(bound).kernel;
     match settings.kernel {
         // The pruned kernel is enough; a larger one must give the same bits, which is what the other choices are
         // for.

@@ -8,24 +8,24 @@ use crate::optics::{Coating, Effect, Effects};
 use crate::text::count_of;
 use serde::Serialize;
 
-/// An effect with the reason why it is, or is not, simulated.
+/// An effect, and why a run simulates it or leaves it out.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Because {
+pub struct EffectReason {
     /// The effect.
     pub effect: Effect,
-    /// The reason why it is, or is not, simulated, in words.
+    /// The reason, in words.
     pub because: String,
 }
 
-/// What a scene calls for.
+/// The effects that a scene calls for, each with its reason, and the kernel that has them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Required {
+pub struct RequiredEffects {
     /// The effects that it calls for.
     pub effects: Effects,
     /// Those effects, each with the reason.
-    pub simulated: Vec<Because>,
+    pub simulated: Vec<EffectReason>,
     /// All other effects, each with the reason.
-    pub not_simulated: Vec<Because>,
+    pub not_simulated: Vec<EffectReason>,
     pub(crate) kernel: KernelKind,
 }
 
@@ -81,11 +81,11 @@ impl KernelKind {
 impl Effects {
     /// Returns the effects that a bound scene calls for, by its faces, media, sources and receivers.
     pub fn required_by(scene: &BoundScene) -> Self {
-        Required::new(scene).effects
+        RequiredEffects::new(scene).effects
     }
 }
 
-impl Required {
+impl RequiredEffects {
     /// Finds which effects a bound scene calls for, each with the reason, and the smallest kernel that has them; runs nothing.
     pub fn new(scene: &BoundScene) -> Self {
         required(scene)
@@ -93,7 +93,7 @@ impl Required {
 }
 
 /// Finds the effects that the scene needs, the reason for or against each, and the smallest kernel that has them all.
-fn required(bound: &BoundScene) -> Required {
+fn required(bound: &BoundScene) -> RequiredEffects {
     let used = |wanted: &dyn Fn(&Surface) -> bool| {
         bound.faces.iter().filter(|f| wanted(&bound.surfaces[f.surface as usize])).count()
     };
@@ -111,7 +111,7 @@ fn required(bound: &BoundScene) -> Required {
         Some(name) => (true, format!("the medium '{name}' {does}")),
         None => (false, none.to_string()),
     };
-    let mut required = Required {
+    let mut required = RequiredEffects {
         effects: Effects::NONE,
         simulated: Vec::new(),
         not_simulated: Vec::new(),
@@ -150,7 +150,7 @@ fn required(bound: &BoundScene) -> Required {
             }
         };
         let list = if wanted { &mut required.simulated } else { &mut required.not_simulated };
-        list.push(Because { effect, because });
+        list.push(EffectReason { effect, because });
         if wanted {
             required.effects.insert(effect);
         }

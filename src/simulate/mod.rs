@@ -67,7 +67,7 @@ mod wavelength_text;
 pub use arrivals::arrivals;
 pub use bind::{BoundScene, LeftOut, RuleFaces, face_selectors};
 pub use dispatch::kernel_name;
-pub use effects::{Because, Required};
+pub use effects::{EffectReason, RequiredEffects};
 pub use error::{Error, ErrorKind};
 pub use face_results::{FaceResult, FaceResults};
 pub use fingerprint::{Fingerprint, FingerprintHasher};

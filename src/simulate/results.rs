@@ -3,7 +3,7 @@
 use super::bind::BoundScene;
 use super::digest::digest;
 use super::dispatch::kernel_kind;
-use super::effects::{Because, Required};
+use super::effects::{EffectReason, RequiredEffects};
 use super::face_results::FaceResults;
 use super::hooks::Traced;
 use super::outcome::{Counts, LostRay, PathVertex};
@@ -96,9 +96,9 @@ pub struct Results {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EffectsUsed {
     /// The effects that were simulated.
-    pub simulated: Vec<Because>,
+    pub simulated: Vec<EffectReason>,
     /// The effects that were not simulated.
-    pub not_simulated: Vec<Because>,
+    pub not_simulated: Vec<EffectReason>,
     /// The kernel that was picked.
     pub kernel: &'static str,
 }
@@ -154,7 +154,7 @@ impl Results {
     /// `trace` have 0 seconds.
     pub fn new(bound: &BoundScene, settings: &RunSettings, traced: Traced) -> Self {
         let plan = Plan::new(bound, settings);
-        let required = Required::new(bound);
+        let required = RequiredEffects::new(bound);
         let Traced { partial, cost, threads } = traced;
         let trace = partial.seconds;
         let mut tallies = partial.tallies;

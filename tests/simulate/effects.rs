@@ -3,7 +3,7 @@
 use crate::support::{Shape, World};
 use lampyris::math::{Frame, Point, Vector};
 use lampyris::pipeline::ErrorTarget;
-use lampyris::simulate::{QUANTA, Required, Results, Scene};
+use lampyris::simulate::{QUANTA, RequiredEffects, Results, Scene};
 use std::f64::consts::PI;
 
 fn slab() -> World {
@@ -302,7 +302,7 @@ fn only_what_happens_is_said_to_be_simulated() {
         world.cuboid("box", Point::splat(-1.0), Point::splat(1.0));
         let text = format!("[[source]]\nat = [5, 4, 3]\n[[material]]\npart = 'box'\n{material}\n");
         let scene = Scene::parse(&text, "test.toml", std::path::Path::new(".")).unwrap();
-        let required = Required::new(&scene.bind(&world.model).unwrap());
+        let required = RequiredEffects::new(&scene.bind(&world.model).unwrap());
         required.simulated.iter().map(|b| format!("{:?}", b.effect)).collect()
     };
     for (material, expected) in [
@@ -330,7 +330,7 @@ fn bare_faces_without_a_medium_are_none_for_light() {
             [[material]]\npart = 'box'\nmedium = 'PMMA'\nsurface = '{surface}'\n{coated}"
         );
         let scene = Scene::parse(&text, "test.toml", std::path::Path::new(".")).unwrap();
-        let required = Required::new(&scene.bind(&world.model).unwrap());
+        let required = RequiredEffects::new(&scene.bind(&world.model).unwrap());
         let fresnel = required.simulated.iter().find(|b| format!("{:?}", b.effect) == "Fresnel");
         assert_eq!(fresnel.map(|b| b.because.as_str()), expected.then_some("6 bare or metal faces"));
     }

@@ -9,7 +9,7 @@ use crate::cli::output::terminal_tables::table_text;
 use crate::model::Part;
 use crate::pipeline::{IntersectorKind, PreparedScene};
 use crate::report::{bytes, seconds};
-use crate::simulate::{Required, rays_of_run};
+use crate::simulate::{RequiredEffects, rays_of_run};
 use crate::text::count_of;
 use serde_json::json;
 use std::path::Path;
@@ -20,7 +20,7 @@ pub(super) fn run(prepared: &PreparedScene, folder: &Path, console: &Console) ->
     let facets = &prepared.facets;
     let loaded = &prepared.job.loaded;
     let faces: usize = loaded.model.parts.iter().map(Part::face_count).sum();
-    let effects = Required::new(&prepared.bound);
+    let effects = RequiredEffects::new(&prepared.bound);
     // Sources may have numbers of their own.
     let rays = rays_of_run(&prepared.bound, &settings);
     if console.json {
