@@ -5,7 +5,7 @@ use super::monitor::{Monitor, Stage, in_stage};
 use super::settings::MeshingSettings;
 use crate::model::{Instancing, Model};
 use crate::simulate::{BoundScene, Scene};
-use crate::tessellate::{self, FaceSelector, GroupedFacets, Tessellation, ToleranceOverride, tessellate};
+use crate::tessellate::{self, GroupedFacets, Tessellation, ToleranceOverride, ToleranceScope, tessellate};
 use crate::text::nearest_or_listed;
 use std::sync::Arc;
 use std::time::Instant;
@@ -33,16 +33,16 @@ pub fn mesh_settings(
     }
     // Later overrides win: roles are the widest, then parts, then single faces.
     for (role, tolerance) in &meshing.role {
-        let place = place_of_role(role, scene, model)?;
-        settings.overrides.push(ToleranceOverride { place, tolerance: *tolerance, radii: None });
+        let scope = scope_of_role(role, scene, model)?;
+        settings.overrides.push(ToleranceOverride { scope, tolerance: *tolerance, radii: None });
     }
     for (name, tolerance) in &meshing.part {
-        let place = place_of_part(name, model)?;
-        settings.overrides.push(ToleranceOverride { place, tolerance: *tolerance, radii: None });
+        let scope = scope_of_part(name, model)?;
+        settings.overrides.push(ToleranceOverride { scope, tolerance: *tolerance, radii: None });
     }
     for (name, tolerance) in &meshing.face {
-        let place = place_of_face(name, model)?;
-        settings.overrides.push(ToleranceOverride { place, tolerance: *tolerance, radii: None });
+        let scope = scope_of_face(name, model)?;
+        settings.overrides.push(ToleranceOverride { scope, tolerance: *tolerance, radii: None });
     }
     Ok(settings)
 }
@@ -51,7 +51,7 @@ pub fn mesh_settings(
 ///
 /// # Errors
 /// When the role is not known or no face has it, there is no scene, or the scene does not fit the model.
-fn place_of_role(role: &str, scene: Option<&Scene>, model: &Model) -> Result<FaceSelector, Error> {
+fn scope_of_role(role: &str, scene: Option<&Scene>, model: &Model) -> Result<ToleranceScope, Error> {
     if !BoundScene::ROLES.contains(&role) {
         let error = Error::setting("role", format!("{role}: there is no such optical role"));
         return Err(error.help(format!("use one of {}", BoundScene::ROLES.join(", "))));
@@ -69,16 +69,16 @@ fn place_of_role(role: &str, scene: Option<&Scene>, model: &Model) -> Result<Fac
         let error = Error::setting("role", format!("{role}: no face of the scene has this role"));
         return Err(error.help(format!("there are faces of: {}", there.join(", "))));
     }
-    Ok(FaceSelector::Placed(faces))
+    Ok(ToleranceScope::Placed(faces))
 }
 
 /// Selects a part by its name, letter for letter.
 ///
 /// # Errors
 /// When there is none, with the names that are like it.
-fn place_of_part(name: &str, model: &Model) -> Result<FaceSelector, Error> {
+fn scope_of_part(name: &str, model: &Model) -> Result<ToleranceScope, Error> {
     if model.parts.iter().any(|p| p.name == name) {
-        return Ok(FaceSelector::Part(name.to_owned()));
+        return Ok(ToleranceScope::Part(name.to_owned()));
     }
     let advice = nearest_or_listed(name, model.parts.iter().map(|p| p.name.as_str()));
     Err(Error::setting("part", format!("{name}: the model has no part of this name")).help(advice.unwrap_or_else(
@@ -91,14 +91,14 @@ fn place_of_part(name: &str, model: &Model) -> Result<FaceSelector, Error> {
 ///
 /// # Errors
 /// When there is none, with the names that are like it.
-fn place_of_face(name: &str, model: &Model) -> Result<FaceSelector, Error> {
+fn scope_of_face(name: &str, model: &Model) -> Result<ToleranceScope, Error> {
     let entity = name.strip_prefix('#').unwrap_or(name).parse().ok();
     let faces = || model.placed_faces().filter_map(|f| f.face);
     if faces().any(|f| f.name == name) {
-        return Ok(FaceSelector::Face(name.to_owned()));
+        return Ok(ToleranceScope::Face(name.to_owned()));
     }
     if let Some(id) = entity.filter(|id| faces().any(|f| f.entity == Some(*id))) {
-        return Ok(FaceSelector::Entity(id));
+        return Ok(ToleranceScope::Entity(id));
     }
     let error = Error::setting("face", format!("{name}: the model has no face of this name or number"));
     Err(error.help(nearest_or_listed(name, faces().map(|f| f.name.as_str())).unwrap_or_else(|| {

@@ -1,7 +1,7 @@
 //! Tolerances that follow the radius of curvature: for each face a share of its own.
 
 use crate::math::FaceId;
-use crate::tessellate::{FaceSelector, Settings, ToleranceLaw, ToleranceOverride};
+use crate::tessellate::{Settings, ToleranceLaw, ToleranceOverride, ToleranceScope};
 use serde::Serialize;
 
 /// Local tolerances for a model: on each face in proportion to the radius of curvature.
@@ -90,7 +90,7 @@ impl TolerancePlan {
         settings.law = ToleranceLaw::Power;
         let own = self.places.iter().map(|share| {
             let (tolerance, radii) = self.range(share);
-            ToleranceOverride { place: FaceSelector::Placed(share.faces.clone()), tolerance, radii: Some(radii) }
+            ToleranceOverride { scope: ToleranceScope::Placed(share.faces.clone()), tolerance, radii: Some(radii) }
         });
         // In front: of several overrides for a face the last one counts.
         settings.overrides.splice(0..0, own);

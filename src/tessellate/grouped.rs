@@ -1,7 +1,7 @@
 //! Facets of a model whose parts that are placed often have coordinates of their own: each group is meshed by itself, once.
 
 use super::extent::has_no_area;
-use super::settings::{FaceSelector, Settings};
+use super::settings::{Settings, ToleranceScope};
 use super::tessellation::Tessellation;
 use crate::math::{Aabb, FaceId, Point, Uv, Vector};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
@@ -142,12 +142,12 @@ fn append_box(mesh: &mut FacetMesh, place: &Placement) {
 }
 
 impl Settings {
-    /// Returns these settings for the faces of one group: [`FaceSelector::Placed`] holds the group's own numbers, each once for all its
+    /// Returns these settings for the faces of one group: [`ToleranceScope::Placed`] holds the group's own numbers, each once for all its
     /// places, and drops other groups' faces; other selectors stay.
     pub fn of_group(&self, instancing: &Instancing, group: usize) -> Self {
         let mut settings = self.clone();
         for o in &mut settings.overrides {
-            let FaceSelector::Placed(faces) = &mut o.place else { continue };
+            let ToleranceScope::Placed(faces) = &mut o.scope else { continue };
             let local = |face: &FaceId| {
                 let (place, local) = instancing.locate(*face);
                 (place.map_or(0, |k| instancing.placements[k].group as usize) == group).then_some(local)

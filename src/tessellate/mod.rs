@@ -67,7 +67,7 @@ pub use report::{
     FaceCounts, FailedFace, FailureCause, NotCertified, Percentiles, Repair, RepairedFace, Report, Sag,
     ShellCounts, ToleranceRange,
 };
-pub use settings::{Acceptance, FaceSelector, LEAST_TOLERANCE_MM, Settings, ToleranceLaw, ToleranceOverride};
+pub use settings::{Acceptance, LEAST_TOLERANCE_MM, Settings, ToleranceLaw, ToleranceOverride, ToleranceScope};
 pub use tessellation::{FacetQuality, Tessellation};
 pub use triangulator::is_panic_guarded;
 

@@ -3,7 +3,7 @@
 use super::expected_cells::angle_within_budget;
 use super::face_surface::FaceSurface;
 use super::proof_steps::ProofSteps;
-use super::settings::{FaceSelector, Settings, ToleranceField};
+use super::settings::{Settings, ToleranceField, ToleranceScope};
 use crate::math::FaceId;
 use crate::model::{Face, Model, Part};
 
@@ -39,14 +39,14 @@ impl<'m> PlacedPart<'m> {
     /// Returns the tolerance (mm of the scene, tightest and loosest as given) and radii, mm, of the `k`-th face, by the last override that
     /// matches, else those of the settings; an override for any of its places holds for all.
     fn tolerance(&self, settings: &Settings, k: usize, face: &Face) -> ([f64; 2], [f64; 2]) {
-        let matches = |place: &FaceSelector| match place {
-            FaceSelector::Part(name) => *name == self.part.name,
-            FaceSelector::Face(name) => *name == face.name,
-            FaceSelector::Entity(id) => face.entity == Some(*id),
-            FaceSelector::Placed(ids) => self.firsts.iter().any(|first| ids.contains(&FaceId(first + k as u32))),
+        let matches = |scope: &ToleranceScope| match scope {
+            ToleranceScope::Part(name) => *name == self.part.name,
+            ToleranceScope::Face(name) => *name == face.name,
+            ToleranceScope::Entity(id) => face.entity == Some(*id),
+            ToleranceScope::Placed(ids) => self.firsts.iter().any(|first| ids.contains(&FaceId(first + k as u32))),
         };
         // The last override that matches counts, as with rules in a style sheet.
-        let last = settings.overrides.iter().rev().find(|o| matches(&o.place));
+        let last = settings.overrides.iter().rev().find(|o| matches(&o.scope));
         last.map_or((settings.tolerance, settings.radii), |o| (o.tolerance, o.radii.unwrap_or(settings.radii)))
     }
 

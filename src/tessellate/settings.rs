@@ -51,11 +51,11 @@ pub struct Settings {
 /// Another tolerance for some faces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ToleranceOverride {
-    /// Where it holds.
-    pub place: FaceSelector,
+    /// The faces that it is for.
+    pub scope: ToleranceScope,
     /// As [`Settings::tolerance`].
     pub tolerance: [f64; 2],
-    /// As [`Settings::radii`], where the place needs its own.
+    /// As [`Settings::radii`], where these faces need their own.
     pub radii: Option<[f64; 2]>,
 }
 
@@ -70,10 +70,10 @@ pub enum ToleranceLaw {
     Power,
 }
 
-/// Selects faces.
+/// The faces that a [`ToleranceOverride`] is for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum FaceSelector {
+pub enum ToleranceScope {
     /// All faces of the parts of this name.
     Part(String),
     /// All faces of this name.

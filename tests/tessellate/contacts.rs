@@ -3,7 +3,7 @@
 use crate::turned::{ball_in_cup, doublet, ring_in_groove, rod_in_hole, rod_in_plate};
 use lampyris::math::{FaceId, Point};
 use lampyris::model::Model;
-use lampyris::tessellate::{FaceSelector, Settings, Tessellation, ToleranceOverride, tessellate};
+use lampyris::tessellate::{Settings, Tessellation, ToleranceOverride, ToleranceScope, tessellate};
 use std::f64::consts::PI;
 
 /// The corners of a facet, each once, in an order that does not depend on where it starts.
@@ -110,8 +110,8 @@ fn a_short_rod_does_not_refine_its_hole() {
 #[test]
 fn faces_in_contact_keep_the_tolerances_asked_of_them() {
     for finer in [1, 6] {
-        let place = FaceSelector::Placed(vec![FaceId(finer)]);
-        let overrides = vec![ToleranceOverride { place, tolerance: [0.01; 2], radii: None }];
+        let scope = ToleranceScope::Placed(vec![FaceId(finer)]);
+        let overrides = vec![ToleranceOverride { scope, tolerance: [0.01; 2], radii: None }];
         let settings = Settings { glue_mm: 1e-3, overrides, ..Settings::uniform(0.05) };
         let made = tessellate(&rod_in_hole(0.4), &settings);
         for (facet, quality) in made.mesh.facets.iter().zip(&made.quality) {

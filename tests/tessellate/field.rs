@@ -4,7 +4,7 @@ use crate::files::fixture;
 use lampyris::math::FaceId;
 use lampyris::model::Model;
 use lampyris::step;
-use lampyris::tessellate::{FaceSelector, Settings, Tessellation, ToleranceOverride, tessellate};
+use lampyris::tessellate::{Settings, Tessellation, ToleranceOverride, ToleranceScope, tessellate};
 
 const FIXTURES: [&str; 7] = [
     "lens_planoconvex_analytic.stp",
@@ -79,8 +79,8 @@ fn held(made: &Tessellation, chosen: impl Fn(usize) -> bool) -> [f64; 2] {
 fn overrides_hold_for_their_part_entity_or_role_alone() {
     let model = model("lamp_multicavity.stp");
     let plain = tessellate(&model, &Settings::uniform(0.2)).report.facets;
-    let run = |place: FaceSelector| {
-        let overrides = vec![ToleranceOverride { place, tolerance: [0.03; 2], radii: None }];
+    let run = |scope: ToleranceScope| {
+        let overrides = vec![ToleranceOverride { scope, tolerance: [0.03; 2], radii: None }];
         tessellate(&model, &Settings { overrides, ..Settings::uniform(0.2) })
     };
     let faces: Vec<_> = model.placed_faces().collect();
@@ -92,11 +92,11 @@ fn overrides_hold_for_their_part_entity_or_role_alone() {
     let role: Vec<FaceId> = (0..faces.len() as u32).step_by(3).map(FaceId).collect();
     let same_face =
         |f: usize| role.iter().any(|r| std::ptr::eq(faces[r.index()].face.unwrap(), faces[f].face.unwrap()));
-    let [tight, loose] = held(&run(FaceSelector::Part(part.clone())), of_part);
+    let [tight, loose] = held(&run(ToleranceScope::Part(part.clone())), of_part);
     assert!(tight <= 0.03 && loose > 0.1, "part: {tight} {loose}");
-    let [tight, loose] = held(&run(FaceSelector::Entity(entity)), |f| faces[f].entity() == Some(entity));
+    let [tight, loose] = held(&run(ToleranceScope::Entity(entity)), |f| faces[f].entity() == Some(entity));
     assert!(tight <= 0.03 && loose > 0.1, "entity: {tight} {loose}");
-    let made = run(FaceSelector::Placed(role.clone()));
+    let made = run(ToleranceScope::Placed(role.clone()));
     let [tight, loose] = held(&made, same_face);
     assert!(tight <= 0.03 && loose > 0.1, "role: {tight} {loose}");
     assert!(made.report.facets > plain);
