@@ -4,7 +4,7 @@ use crate::errors::Defect;
 use lampyris::intersect::NormalMode;
 use lampyris::pipeline::{Monitor, Stage, TracingSettings};
 use lampyris::study;
-use lampyris::study::default_accuracy::Chosen;
+use lampyris::study::default_accuracy::TracingChoice;
 use lampyris::text::figures;
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -102,7 +102,7 @@ impl Monitor for SharedProgress {
         locked(&self.warnings).push(message.to_owned());
     }
 
-    fn chosen(&self, chosen: &Chosen) {
+    fn chosen(&self, chosen: &TracingChoice) {
         // In the words of the command.
         if chosen.has_no_surface {
             return self.say(format!("{}, and nothing is met", chosen.because));

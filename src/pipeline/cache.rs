@@ -16,7 +16,7 @@ use crate::mesh::FacetMesh;
 use crate::mesh::arrays::{ArrayReader, invalid, write_array};
 use crate::simulate::{Fingerprint, FingerprintHasher, Scene};
 use crate::step::ImportReport;
-use crate::study::default_accuracy::Chosen;
+use crate::study::default_accuracy::TracingChoice;
 use crate::tessellate;
 use std::fs::{self, File};
 use std::hash::{BuildHasher, Hasher, RandomState};
@@ -72,20 +72,21 @@ impl Cache {
         Self { most_bytes, ..self }
     }
 
-    /// Returns what was chosen for the run of this name, before it was decided; `None` where that is not kept.
-    pub(super) fn choice(&self, undecided: &Fingerprint, monitor: &dyn Monitor) -> Option<Chosen> {
-        let read = |from: &mut ArrayReader| Chosen::from_words(&from.array()?).ok_or_else(|| invalid("no choice"));
-        self.fetch(&choice_name(undecided), monitor, read)
+    /// Returns what was chosen for a run, by its fingerprint before the choice; `None` where that is not kept.
+    pub(super) fn choice(&self, run: &Fingerprint, monitor: &dyn Monitor) -> Option<TracingChoice> {
+        let read =
+            |from: &mut ArrayReader| TracingChoice::from_words(&from.array()?).ok_or_else(|| invalid("no choice"));
+        self.fetch(&choice_name(run), monitor, read)
     }
 
     /// As [`Cache::choice`], or the turn to choose: another process that does so is waited for.
-    pub(super) fn choice_or_turn(&self, undecided: &Fingerprint, monitor: &dyn Monitor) -> Result<Chosen, Turn> {
-        self.fetch_or_turn(&choice_name(undecided), || self.choice(undecided, monitor))
+    pub(super) fn choice_or_turn(&self, run: &Fingerprint, monitor: &dyn Monitor) -> Result<TracingChoice, Turn> {
+        self.fetch_or_turn(&choice_name(run), || self.choice(run, monitor))
     }
 
     /// Keeps what was chosen for a later run, another shard or range among them; a failure is only told to the monitor.
-    pub(super) fn keep_choice(&self, undecided: &Fingerprint, chosen: &Chosen, monitor: &dyn Monitor) {
-        self.keep(&choice_name(undecided), monitor, |to| write_array(to, &chosen.to_words()));
+    pub(super) fn keep_choice(&self, run: &Fingerprint, chosen: &TracingChoice, monitor: &dyn Monitor) {
+        self.keep(&choice_name(run), monitor, |to| write_array(to, &chosen.to_words()));
     }
 
     /// Returns what `fetch` finds in the entry of this name, which another process may be making and is waited for; the turn to make it
@@ -278,8 +279,8 @@ impl CachedFacets<'_> {
 }
 
 /// Returns the name of the file that keeps what was chosen for a run.
-fn choice_name(undecided: &Fingerprint) -> String {
-    format!("{}{}", undecided.0, CHOICE)
+fn choice_name(run: &Fingerprint) -> String {
+    format!("{}{}", run.0, CHOICE)
 }
 
 /// Hashes all that decides facets and octree but the octree's settings, of which the arrays hold none that is not the program's default;

@@ -10,7 +10,7 @@ use crate::intersect::octree::{self, Octree};
 use crate::intersect::{Intersector, NormalMode};
 use crate::model::Model;
 use crate::simulate::{BoundScene, RunSettings, Scene};
-use crate::study::default_accuracy::{self, Chosen, PilotSource, TimedFacets, Undecided};
+use crate::study::default_accuracy::{self, PilotSource, TimedFacets, TracingChoice, UndecidedRun};
 use crate::tessellate::{self, GroupedFacets};
 use std::cell::OnceCell;
 use std::slice;
@@ -78,13 +78,13 @@ pub(super) fn choose<'a>(
     run: &'a RunSettings,
     (facets, mesher): (&'a GroupedFacets, &'a tessellate::Settings),
     monitor: &dyn Monitor,
-) -> (Chosen, Option<TimedFacets>) {
+) -> (TracingChoice, Option<TimedFacets>) {
     let instancing = facets.instancing.as_deref();
     let models = instancing.map_or(slice::from_ref(model), |i| &i.groups);
     let source = Source { model, made: facets, mesher, surfaces, exact: OnceCell::new() };
     in_stage(monitor, Stage::Choosing, || {
         let tolerance = mesher.tolerance;
-        default_accuracy::choose(&Undecided { models, bound, run, source: &source, facets, tolerance })
+        default_accuracy::choose(&UndecidedRun { models, bound, run, source: &source, facets, tolerance })
     })
 }
 
@@ -98,11 +98,11 @@ pub(super) fn needs_pilot(
     let models = facets.instancing.as_deref().map_or(slice::from_ref(model), |i| &i.groups);
     let source = Source { model, made: facets, mesher, surfaces: &|| &[], exact: OnceCell::new() };
     let tolerance = mesher.tolerance;
-    Undecided { models, bound, run, source: &source, facets, tolerance }.needs_pilot()
+    UndecidedRun { models, bound, run, source: &source, facets, tolerance }.needs_pilot()
 }
 
 /// Returns what finds the hits of a run whose accuracy was chosen, and its normals: the exact spline by that name, else the octree.
-pub(super) fn intersector_choice(chosen: &Chosen) -> IntersectorChoice {
+pub(super) fn intersector_choice(chosen: &TracingChoice) -> IntersectorChoice {
     let intersector = match chosen.intersector {
         "exact" => IntersectorKind::Exact,
         _ => IntersectorKind::Octree,

@@ -2,7 +2,7 @@
 
 use super::settings::IntersectorKind;
 use crate::study;
-use crate::study::default_accuracy::Chosen;
+use crate::study::default_accuracy::TracingChoice;
 use std::path::Path;
 
 /// A stage of a job.
@@ -50,7 +50,7 @@ pub trait Monitor: Sync {
     fn warns(&self, _message: &str) {}
 
     /// Told when tolerance, normals and intersector were chosen.
-    fn chosen(&self, _chosen: &Chosen) {}
+    fn chosen(&self, _chosen: &TracingChoice) {}
 
     /// Told when facets that keep an accuracy are found, with a sentence about them.
     fn aimed(&self, _answer: &str) {}

@@ -21,7 +21,7 @@ use crate::simulate::{
     BoundScene, Fingerprint, Hooks, PartialRun, PathSink, Progress, RunSettings, Scene, Traced, grows,
     replicate_range, trace,
 };
-use crate::study::default_accuracy::Chosen;
+use crate::study::default_accuracy::TracingChoice;
 use crate::tessellate::{self, GroupedFacets};
 use std::ops::Range;
 use std::slice;
@@ -59,7 +59,7 @@ pub struct PreparedScene {
     /// Rays to trace from the first on, in place of what the settings and the scene say: of a run that is to grow, or has grown.
     pub rays: Option<u64>,
     /// Why it is traced as it is, where nobody asked for it.
-    pub chosen: Option<Chosen>,
+    pub chosen: Option<TracingChoice>,
     /// Built once for the run, where that asks the spline.
     surfaces: OnceLock<Vec<Arc<TrueSurface>>>,
     /// Built once for pilot and check; a run on the spline takes those of them that are not coarser than its own.
@@ -188,7 +188,7 @@ impl PreparedScene {
 
     /// Takes from the job what a part of the same run chose and returns it, or else what the cache keeps of the same choice; `None` where
     /// there is neither.
-    fn known_choice(&mut self, monitor: &dyn Monitor) -> Option<Chosen> {
+    fn known_choice(&mut self, monitor: &dyn Monitor) -> Option<TracingChoice> {
         if let Some(part) = self.job.chosen.take() {
             // Program, scene, files and settings are the same: so would be what a pilot of this process finds.
             let run = self.run_settings();
@@ -208,14 +208,14 @@ impl PreparedScene {
     }
 
     /// Returns the mesher's settings and the intersector that a choice stands for.
-    fn settings_of(&self, chosen: &Chosen) -> (tessellate::Settings, IntersectorChoice) {
+    fn settings_of(&self, chosen: &TracingChoice) -> (tessellate::Settings, IntersectorChoice) {
         let mesher = tessellate::Settings { tolerance: chosen.tolerance_mm, ..self.mesh_settings.clone() };
         (mesher, default_accuracy::intersector_choice(chosen))
     }
 
     /// Takes tolerance, normals and intersector of a choice and tells the monitor. The facets are left as they are: the caller makes
     /// those of the choice.
-    fn take_choice(&mut self, chosen: Chosen, monitor: &dyn Monitor) {
+    fn take_choice(&mut self, chosen: TracingChoice, monitor: &dyn Monitor) {
         monitor.chosen(&chosen);
         (self.mesh_settings, self.choice) = self.settings_of(&chosen);
         self.chosen = Some(chosen);
@@ -232,7 +232,7 @@ impl PreparedScene {
 
     /// Chooses the facets or the spline that a pilot finds sufficient. May put finer facets in place of those that were made. `excess` is
     /// the number of facets that the default tolerance would make, where those were too many to be tried.
-    fn choose_accuracy(&mut self, run: RunSettings, excess: Option<f64>, monitor: &dyn Monitor) -> Chosen {
+    fn choose_accuracy(&mut self, run: RunSettings, excess: Option<f64>, monitor: &dyn Monitor) -> TracingChoice {
         let surfaces = || self.surfaces_for_few_rays();
         let facets = (&self.facets, &self.mesh_settings);
         let model = (&self.job.loaded.model, &surfaces as &dyn Fn() -> _);

@@ -9,7 +9,7 @@ use crate::mesh::FacetMesh;
 use crate::model::Instancing;
 use crate::simulate::{Fingerprint, Scene};
 use crate::study::accuracy_target::AccuracyResult;
-use crate::study::default_accuracy::Chosen;
+use crate::study::default_accuracy::TracingChoice;
 use crate::tessellate::{self, GroupedFacets, Tessellation};
 use std::slice;
 use std::sync::Arc;
@@ -38,7 +38,7 @@ pub struct SceneJob {
 #[derive(Clone, Debug)]
 pub struct PartChoice {
     /// The choice, with what its pilot found.
-    pub chosen: Chosen,
+    pub chosen: TracingChoice,
     /// The fingerprint of that run.
     pub fingerprint: Fingerprint,
 }

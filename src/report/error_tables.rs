@@ -6,7 +6,7 @@ use super::maps::axis_labels;
 use super::number::unit_in_words;
 use super::{Cell, Table};
 use crate::simulate::{ReceiverResult, Results};
-use crate::study::default_accuracy::Chosen;
+use crate::study::default_accuracy::TracingChoice;
 use crate::study::figures::{Figure, Limit, ReceiverFigures, figure_in_words};
 use crate::study::geometric_error::{GeometricError, Paired};
 use crate::study::model_figures::PowerFigures;
@@ -216,7 +216,7 @@ fn figure_of_receiver(results: &Results, named: &str) -> String {
 }
 
 /// Makes a table of the ways that a pilot tried before the run was chosen to be traced so, each with the figure it gets most wrong.
-pub(super) fn alternative_table(chosen: &Chosen, results: &Results) -> Table {
+pub(super) fn alternative_table(chosen: &TracingChoice, results: &Results) -> Table {
     let columns = [
         ("intersector", ""),
         ("normals", ""),

@@ -5,7 +5,7 @@ use super::number::{error_figures, known_figures, with_unit};
 use super::seconds;
 use crate::intersect::NormalMode;
 use crate::simulate::{Absorbed, Results};
-use crate::study::default_accuracy::Chosen;
+use crate::study::default_accuracy::TracingChoice;
 use crate::study::figures::{ChannelFigure, Figure, Limit, ReceiverFigures, halving};
 use crate::study::geometric_error::{GeometricError, Paired, ReceiverError};
 use crate::study::model_figures::PowerFigures;
@@ -194,7 +194,7 @@ pub(super) fn halving_cost(
 }
 
 /// Writes what the run was traced on, the facets' tolerance in mm, and why it was chosen.
-pub(super) fn choice_sentence(chosen: &Chosen) -> String {
+pub(super) fn choice_sentence(chosen: &TracingChoice) -> String {
     if chosen.has_no_surface {
         return format!("Nothing was met, because {}. ", chosen.because);
     }

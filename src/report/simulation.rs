@@ -14,7 +14,7 @@ use crate::regulation::Assessment;
 use crate::simulate::{Event, PathVertex, Results};
 use crate::study::figures::ReceiverFigures;
 use crate::study::model_figures::PowerFigures;
-use crate::study::{cross_check::CrossCheck, default_accuracy::Chosen, geometric_error::GeometricError};
+use crate::study::{cross_check::CrossCheck, default_accuracy::TracingChoice, geometric_error::GeometricError};
 use crate::text::{count_of, figures, grouped};
 
 /// Share of the power from which on light that limits cut off is spoken of: below it no figure of four digits changes.
@@ -55,7 +55,7 @@ pub struct SimulationReport<'a> {
     /// Where the power went, with both errors.
     pub power: &'a PowerFigures,
     /// Why the run was traced as it was, where it was not asked for.
-    pub chosen: Option<&'a Chosen>,
+    pub chosen: Option<&'a TracingChoice>,
     /// What regulations say of receivers, by their index.
     pub verdicts: &'a [(usize, Assessment)],
     /// More sections, after that of the light.

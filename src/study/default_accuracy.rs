@@ -45,9 +45,9 @@ const FLAT: &str = "all faces are flat, so that facets are the surface itself";
 const NO_MODEL: &str = "there is no model";
 const NO_FACETS: &str = "no face has facets";
 
-/// What a run is traced with, and why.
+/// The tolerance, normals and intersector that a run is traced with, and why.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Chosen {
+pub struct TracingChoice {
     /// Smallest and largest tolerance of the facets, mm; of those that are drawn, where the run is on the spline.
     pub tolerance_mm: [f64; 2],
     /// Normals at the hits.
@@ -64,7 +64,7 @@ pub struct Chosen {
     pub pilot_rays: u64,
     /// Seconds of the pilot.
     pub pilot_seconds: f64,
-    /// Everything that was measured, the chosen among it.
+    /// Everything that was measured, the choice among it.
     pub alternatives: Vec<Alternative>,
     /// What the facets that were taken change of the figures; `None` on the spline.
     #[serde(skip)]
@@ -118,9 +118,9 @@ pub trait PilotSource {
     fn exact(&self) -> &dyn Intersector;
 }
 
-/// A run that has to be given tolerance, normals and intersector.
+/// A run whose tolerance, normals and intersector are still to be chosen.
 #[derive(Clone, Copy)]
-pub struct Undecided<'a> {
+pub struct UndecidedRun<'a> {
     /// The models of its groups; of a model in one piece that one.
     pub models: &'a [Model],
     /// The scene.
@@ -129,17 +129,17 @@ pub struct Undecided<'a> {
     pub run: &'a RunSettings,
     /// Makes finer facets and the spline.
     pub source: &'a dyn PilotSource,
-    /// Facets of the default tolerance.
+    /// Facets of the tolerance below.
     pub facets: &'a GroupedFacets,
-    /// That tolerance, mm.
+    /// Smallest and largest tolerance of these facets, mm: the default, or a coarser one where that would make too many.
     pub tolerance: [f64; 2],
 }
 
-/// Chooses facets or spline, by a pilot unless [`Undecided::needs_pilot`] says no; returns finer facets too where the choice is
-/// those that it made.
-pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
+/// Chooses facets or spline, by a pilot unless [`UndecidedRun::needs_pilot`] says no; returns finer facets too where the choice is those
+/// that it made.
+pub fn choose(undecided: &UndecidedRun<'_>) -> (TracingChoice, Option<TimedFacets>) {
     let start = Instant::now();
-    let Undecided { bound, tolerance, .. } = *undecided;
+    let UndecidedRun { bound, tolerance, .. } = *undecided;
     if let Some(chosen) = undecided.without_pilot() {
         return (chosen, None);
     }
@@ -158,16 +158,18 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
         alternative(tolerance, ON_SPLINE, &Worst::default(), error.seconds[1] * scale),
     ];
     let chosen =
-        |(intersector, normals), tolerance_mm, because, alternatives, geometric: Option<GeometricError>| Chosen {
-            tolerance_mm,
-            normals,
-            intersector,
-            because,
-            has_no_surface: false,
-            pilot_rays: settings.rays,
-            pilot_seconds: start.elapsed().as_secs_f64(),
-            alternatives,
-            geometric: geometric.map(|error| error.with_unseen_rays(emitted)),
+        |(intersector, normals), tolerance_mm, because, alternatives, geometric: Option<GeometricError>| {
+            TracingChoice {
+                tolerance_mm,
+                normals,
+                intersector,
+                because,
+                has_no_surface: false,
+                pilot_rays: settings.rays,
+                pilot_seconds: start.elapsed().as_secs_f64(),
+                alternatives,
+                geometric: geometric.map(|error| error.with_unseen_rays(emitted)),
+            }
         };
     let unjudged = error.unjudged(scale, emitted).map(|name| name.to_owned());
     if worst.ratio <= 1.0 && unjudged.is_none() {
@@ -245,7 +247,7 @@ fn alternative(
     }
 }
 
-impl Undecided<'_> {
+impl UndecidedRun<'_> {
     /// Whether it takes a pilot to choose.
     pub fn needs_pilot(&self) -> bool {
         self.without_pilot().is_none()
@@ -253,7 +255,7 @@ impl Undecided<'_> {
 
     /// Chooses facets or spline by what is known without tracing, as for flat faces, ready meshes alone and short runs; `None` where a
     /// pilot is needed.
-    fn without_pilot(&self) -> Option<Chosen> {
+    fn without_pilot(&self) -> Option<TracingChoice> {
         // What is cheap to ask comes first.
         let has_no_surface = self.facets.is_empty();
         let ((intersector, normals), because) = if has_no_surface {
@@ -271,7 +273,7 @@ impl Undecided<'_> {
             return None;
         };
         let because = because.to_owned();
-        Some(Chosen {
+        Some(TracingChoice {
             tolerance_mm: self.tolerance,
             normals,
             intersector,

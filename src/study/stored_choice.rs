@@ -5,7 +5,7 @@
 //! `exchange_` function appends its value's words to a `Writer`, or replaces the value by what the next words of a `Reader` say; `None`
 //! where they end too early or say nothing that the value can be.
 
-use super::default_accuracy::{Alternative, Chosen};
+use super::default_accuracy::{Alternative, TracingChoice};
 use super::geometric_error::{
     AbsorbedError, ChannelError, EndErrors, FaceError, GeometricError, MapError, Paired, ReceiverError, Statistical,
 };
@@ -18,7 +18,7 @@ const INTERSECTORS: [&str; 2] = ["octree", "exact"];
 /// What positions on a receiver are counted in, by its number.
 const UNITS: [&str; 3] = ["", "mm", "deg"];
 
-impl Chosen {
+impl TracingChoice {
     /// Returns everything about the choice, what its pilot found among it, as words.
     pub fn to_words(&self) -> Vec<u64> {
         let mut writer = Writer(vec![FORM]);
@@ -84,9 +84,9 @@ impl Words for Reader<'_> {
 }
 
 /// Writes or reads a choice.
-fn exchange_choice(words: &mut dyn Words, choice: &mut Chosen) -> Option<()> {
+fn exchange_choice(words: &mut dyn Words, choice: &mut TracingChoice) -> Option<()> {
     // Taken apart, here and below, so that a new field is not forgotten.
-    let Chosen {
+    let TracingChoice {
         tolerance_mm,
         normals,
         intersector,
@@ -296,7 +296,7 @@ mod tests {
     use super::*;
 
     /// A choice none of whose numbers is another's, with some that no text holds.
-    fn choice() -> Chosen {
+    fn choice() -> TracingChoice {
         let paired = |k: f64| Paired { facets: k, spline: k + 0.1, error: f64::MIN_POSITIVE * k };
         let receiver = ReceiverError {
             name: "Wand – süd".into(),
@@ -360,7 +360,7 @@ mod tests {
                 statistical: [13.0, 14.0, 15.0],
             }],
         };
-        Chosen {
+        TracingChoice {
             tolerance_mm: [0.1 + 0.2, 0.7],
             normals: NormalMode::Bilinear,
             intersector: "octree",
@@ -375,9 +375,9 @@ mod tests {
 
     #[test]
     fn a_choice_comes_back_to_the_bit() {
-        for kept in [choice(), Chosen { geometric: None, ..choice() }] {
+        for kept in [choice(), TracingChoice { geometric: None, ..choice() }] {
             let words = kept.to_words();
-            let back = Chosen::from_words(&words).unwrap();
+            let back = TracingChoice::from_words(&words).unwrap();
             assert_eq!(back, kept);
             // Zeros of either sign are equal as numbers.
             assert_eq!(back.to_words(), words);
@@ -387,14 +387,14 @@ mod tests {
     #[test]
     fn other_words_are_no_choice() {
         let words = choice().to_words();
-        let cut = (0..words.len()).filter_map(|end| Chosen::from_words(&words[..end])).count();
+        let cut = (0..words.len()).filter_map(|end| TracingChoice::from_words(&words[..end])).count();
         let changed = |k: usize, word: u64| {
             let mut words = words.clone();
             words[k] = word;
-            Chosen::from_words(&words)
+            TracingChoice::from_words(&words)
         };
         assert_eq!(cut, 0);
         assert!(changed(0, 1).is_none() && changed(3, 99).is_none() && changed(5, u64::MAX).is_none());
-        assert!(Chosen::from_words(&[&words[..], &[0]].concat()).is_none());
+        assert!(TracingChoice::from_words(&[&words[..], &[0]].concat()).is_none());
     }
 }

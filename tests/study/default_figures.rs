@@ -9,7 +9,7 @@ use lampyris::intersect::octree::{self, Octree};
 use lampyris::intersect::{Intersector, NormalMode};
 use lampyris::simulate::{BoundScene, Results, RunSettings, Scene, simulate};
 use lampyris::step;
-use lampyris::study::default_accuracy::{Chosen, PilotSource, TimedFacets, Undecided, choose};
+use lampyris::study::default_accuracy::{PilotSource, TimedFacets, TracingChoice, UndecidedRun, choose};
 use lampyris::study::figures::{Figure, Limit, ReceiverFigures, Surface, figures};
 use lampyris::study::geometric_error::{GeometricError, Paired, geometric_error};
 use lampyris::study::model_figures::power_figures;
@@ -20,7 +20,7 @@ use std::path::Path;
 
 /// What a run without any option answers.
 struct Answer {
-    chosen: Chosen,
+    chosen: TracingChoice,
     results: Results,
     figures: Vec<ReceiverFigures>,
 }
@@ -66,7 +66,7 @@ fn default_answer_of(known: &KnownScene, run: &RunSettings) -> Answer {
     let mesher = tessellate::Settings::default();
     let facets = tessellate(&known.model, &mesher).into();
     let source = InOnePiece(ModelMeshSource::new(&known.model));
-    let undecided = Undecided {
+    let undecided = UndecidedRun {
         models: std::slice::from_ref(&known.model),
         bound: &bound,
         run,
@@ -124,8 +124,8 @@ fn the_default_answer_is_right_on_scenes_known_in_closed_form() {
     assert!(count >= 60 && missed.len() as f64 <= 0.02 * count as f64, "{} of {count}: {missed:#?}", missed.len());
 }
 
-/// A black ball takes a ten-thousandth of the light, three rays of the pilot, none of which need pass its facets: that they see no difference
-/// tells of none.
+/// A black ball takes a ten-thousandth of the light, three rays of the pilot, none of which need pass its facets: that they see no
+/// difference tells of none.
 #[test]
 fn a_receiver_that_few_rays_of_the_pilot_reach_takes_the_spline() {
     let text = "[[source]]\nkind = 'cone'\nhalf_angle_deg = 60\nat = [0, 0, -200]\ndirection = [0, 0, 1]\npower = 1\n\
@@ -318,7 +318,7 @@ fn facets_change_a_bin_as_they_change_its_light() {
 fn the_choice_does_not_depend_on_threads() {
     for known in [known_scenes::freeform(0.008, 0.004), known_scenes::plate()] {
         let [one, three] = [1, 3].map(|threads| default_answer(&known, 40_000, threads));
-        let bare = |c: &Chosen| (c.intersector, c.tolerance_mm, c.because.clone(), c.pilot_rays);
+        let bare = |c: &TracingChoice| (c.intersector, c.tolerance_mm, c.because.clone(), c.pilot_rays);
         assert_eq!(bare(&one.chosen), bare(&three.chosen));
         assert_eq!(one.results.digest, three.results.digest);
         assert_eq!(one.chosen.geometric.map(|g| g.receivers), three.chosen.geometric.map(|g| g.receivers));

@@ -14,7 +14,7 @@ use crate::pipeline::{
 };
 use crate::simulate::{Fingerprint, PartialRun};
 use crate::study::accuracy_target::{RelativeTolerance, TolerancePlan};
-use crate::study::default_accuracy::Chosen;
+use crate::study::default_accuracy::TracingChoice;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -101,7 +101,7 @@ impl TallyHeader {
             run_rays: prepared.run_settings().rays,
             first_ray: t.ray_range.and_then(|range| range.first),
             accuracy: accuracy_options(prepared),
-            choice: prepared.chosen.as_ref().map(Chosen::to_words),
+            choice: prepared.chosen.as_ref().map(TracingChoice::to_words),
             seed: t.seed,
             intersector: t.intersector.map(|i| i.to_string()),
             normals: t.normals.map(|n| n.to_string()),
@@ -165,7 +165,7 @@ impl TallyHeader {
 
     /// Returns what the part chose where nobody asked; `None` if somebody did, or it is of a form that is no longer known.
     pub(crate) fn choice(&self) -> Option<PartChoice> {
-        let chosen = Chosen::from_words(self.choice.as_ref()?)?;
+        let chosen = TracingChoice::from_words(self.choice.as_ref()?)?;
         Some(PartChoice { chosen, fingerprint: Fingerprint(self.fingerprint.clone()) })
     }
 

@@ -8,7 +8,7 @@ use crate::intersect::NormalMode;
 use crate::pipeline::{Monitor, Stage};
 use crate::report::tolerance_text;
 use crate::study;
-use crate::study::default_accuracy::Chosen;
+use crate::study::default_accuracy::TracingChoice;
 use crate::text::{figures, grouped};
 use indicatif::ProgressBar;
 use std::sync::{Mutex, MutexGuard};
@@ -102,7 +102,7 @@ impl Monitor for TerminalMonitor<'_> {
         self.console.say_once(message);
     }
 
-    fn chosen(&self, chosen: &Chosen) {
+    fn chosen(&self, chosen: &TracingChoice) {
         if !self.is_tracing {
             return;
         }
