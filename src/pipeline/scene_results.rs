@@ -4,7 +4,7 @@ use super::prepared_scene::PreparedScene;
 use super::settings::IntersectorKind;
 use crate::simulate::{PartialRun, ReceiverResult, Results, Verification};
 use crate::study::cross_check::CrossCheck;
-use crate::study::figures::{self, ReceiverFigures, Surface};
+use crate::study::figures::{self, ReceiverFigures, TracedGeometry};
 use crate::study::geometric_error::GeometricError;
 use crate::study::model_figures::{PowerFigures, power_figures};
 use serde_json::Value;
@@ -34,20 +34,20 @@ impl SceneResults {
 
     /// Returns the figures of every receiver with both their errors; the geometric one is absent where facets were not compared.
     pub fn figures(&self, prepared: &PreparedScene) -> Vec<ReceiverFigures> {
-        figures::figures(&self.results, self.surface(prepared), prepared.power_unit())
+        figures::figures(&self.results, self.geometry(prepared), prepared.power_unit())
     }
 
     /// Returns the powers by where light ended and those that bodies and media took, with both their errors.
     pub fn power_figures(&self, prepared: &PreparedScene) -> PowerFigures {
-        power_figures(&self.results, self.surface(prepared), prepared.power_unit())
+        power_figures(&self.results, self.geometry(prepared), prepared.power_unit())
     }
 
     /// Returns what the run was traced on: the spline, or facets with what they change where that was measured.
-    fn surface(&self, prepared: &PreparedScene) -> Surface<'_> {
+    fn geometry(&self, prepared: &PreparedScene) -> TracedGeometry<'_> {
         match (prepared.choice.intersector, &self.geometric) {
-            (IntersectorKind::Exact, _) => Surface::Spline,
-            (_, Some(error)) => Surface::Facets(error),
-            (_, None) => Surface::Unmeasured,
+            (IntersectorKind::Exact, _) => TracedGeometry::Spline,
+            (_, Some(error)) => TracedGeometry::Facets(error),
+            (_, None) => TracedGeometry::Unmeasured,
         }
     }
 

@@ -112,9 +112,9 @@ pub fn figure_in_words(name: &str) -> String {
     }
 }
 
-/// Where a run found its hits, as far as its figures ask.
+/// What a run was traced on, as the errors of its figures depend on it.
 #[derive(Clone, Copy, Debug)]
-pub enum Surface<'a> {
+pub enum TracedGeometry<'a> {
     /// On the surfaces themselves.
     Spline,
     /// On facets, whose errors were measured.
@@ -124,9 +124,9 @@ pub enum Surface<'a> {
 }
 
 /// Returns the figures of every receiver of a run; `unit` is that of powers, `W` or `lm`.
-pub fn figures(results: &Results, surface: Surface<'_>, unit: &str) -> Vec<ReceiverFigures> {
+pub fn figures(results: &Results, geometry: TracedGeometry<'_>, unit: &str) -> Vec<ReceiverFigures> {
     let receivers = results.receivers.iter().enumerate();
-    receivers.map(|(k, r)| Errors::new(results, surface, k).figures(r, unit)).collect()
+    receivers.map(|(k, r)| Errors::new(results, geometry, k).figures(r, unit)).collect()
 }
 
 /// Returns the standard error of each cell, in `r.unit`; where no light arrived, what one ray would add to the cell. Empty without cells.
@@ -202,7 +202,7 @@ const STANDS_OUT: f64 = 4.0;
 
 /// What is known of the geometric errors of one receiver.
 struct Errors<'a> {
-    surface: Surface<'a>,
+    geometry: TracedGeometry<'a>,
     measured: Option<&'a ReceiverError>,
     /// Light that was lost: it might have fallen on any receiver, so it is an error of every one, on the spline too.
     lost_power: f64,
@@ -215,22 +215,22 @@ struct Errors<'a> {
 
 impl<'a> Errors<'a> {
     /// Gathers what is known of the geometric errors of receiver `receiver`.
-    fn new(results: &Results, surface: Surface<'a>, receiver: usize) -> Self {
-        let measured = match surface {
-            Surface::Facets(error) => error.receivers.get(receiver),
+    fn new(results: &Results, geometry: TracedGeometry<'a>, receiver: usize) -> Self {
+        let measured = match geometry {
+            TracedGeometry::Facets(error) => error.receivers.get(receiver),
             _ => None,
         };
         let lost_power = results.power.lost;
-        let unseen_power = match surface {
-            Surface::Facets(error) => error.unseen_power(results.power.emitted),
+        let unseen_power = match geometry {
+            TracedGeometry::Facets(error) => error.unseen_power(results.power.emitted),
             _ => 0.0,
         };
-        let compared = match surface {
-            Surface::Facets(error) if error.rays > 0 => error.rays as f64 / results.rays.max(1) as f64,
+        let compared = match geometry {
+            TracedGeometry::Facets(error) if error.rays > 0 => error.rays as f64 / results.rays.max(1) as f64,
             _ => f64::INFINITY,
         };
         Self {
-            surface,
+            geometry,
             measured,
             compared,
             lost_power,
@@ -244,10 +244,10 @@ impl<'a> Errors<'a> {
     /// in place of `of_facets`.
     fn geometric(&self, lost: f64, unmet: f64, of_facets: impl Fn(&ReceiverError) -> f64) -> Option<f64> {
         let of_facets = |m: &ReceiverError| if self.is_unmet() { unmet } else { of_facets(m) };
-        match self.surface {
-            Surface::Spline => Some(lost),
-            Surface::Facets(_) => self.measured.map(|m| of_facets(m).hypot(lost)),
-            Surface::Unmeasured => None,
+        match self.geometry {
+            TracedGeometry::Spline => Some(lost),
+            TracedGeometry::Facets(_) => self.measured.map(|m| of_facets(m).hypot(lost)),
+            TracedGeometry::Unmeasured => None,
         }
     }
 

@@ -4,7 +4,7 @@ use lampyris::intersect::octree::{self, Octree};
 use lampyris::mesh::FacetMesh;
 use lampyris::model::Model;
 use lampyris::simulate::{RunSettings, Scene, simulate};
-use lampyris::study::figures::{Limit, Surface, cell_errors, figures};
+use lampyris::study::figures::{Limit, TracedGeometry, cell_errors, figures};
 use std::path::Path;
 
 /// Of 1 W in 10,000 rays one is 0.1 mW, on a cell of 1 cm² 1 W/m²; in replicates of 78 rays, for 78.125 in the mean, a little more.
@@ -34,7 +34,7 @@ fn what_no_ray_reached_is_not_stated_as_exactly_dark() {
     let heaviest = 78.125 / 78.0;
     close(lit[1], heaviest);
     cell_errors(&results.receivers[1]).into_iter().for_each(|error| close(error, heaviest));
-    let dark = &figures(&results, Surface::Spline, "W")[1];
+    let dark = &figures(&results, TracedGeometry::Spline, "W")[1];
     close(dark.power.statistical, 1e-4 * heaviest);
     close(dark.max.as_ref().unwrap().statistical, heaviest);
     assert_eq!((dark.power.value, dark.power.limited_by), (0.0, Limit::Statistics));
@@ -54,7 +54,7 @@ fn places_of_few_rays_have_honest_errors() {
     for seed in 0..400 {
         let settings = RunSettings { seed, threads: 1, ..RunSettings::from(&scene.run) };
         let results = simulate(&bound, &nothing, &settings, &|_| true);
-        let all = &figures(&results, Surface::Spline, "W")[0];
+        let all = &figures(&results, TracedGeometry::Spline, "W")[0];
         let places = all.named().filter(|(name, _)| name.starts_with("rms") || name.starts_with("centroid"));
         for (name, figure) in places {
             let truth = if name.starts_with("rms") { 20.0 / 12f64.sqrt() } else { 0.0 };

@@ -10,7 +10,7 @@ use lampyris::intersect::{Intersector, NormalMode};
 use lampyris::simulate::{BoundScene, Results, RunSettings, Scene, simulate};
 use lampyris::step;
 use lampyris::study::default_accuracy::{PilotSource, TimedFacets, TracingChoice, UndecidedRun, choose};
-use lampyris::study::figures::{Figure, Limit, ReceiverFigures, Surface, figures};
+use lampyris::study::figures::{Figure, Limit, ReceiverFigures, TracedGeometry, figures};
 use lampyris::study::geometric_error::{GeometricError, Paired, geometric_error};
 use lampyris::study::model_figures::power_figures;
 use lampyris::study::{FacetTree, MeshSource, ModelMeshSource, Random};
@@ -87,7 +87,7 @@ fn default_answer_of(known: &KnownScene, run: &RunSettings) -> Answer {
             simulate(&bound, &octree, run, &|_| true)
         }
     };
-    let surface = chosen.geometric.as_ref().map_or(Surface::Spline, Surface::Facets);
+    let surface = chosen.geometric.as_ref().map_or(TracedGeometry::Spline, TracedGeometry::Facets);
     let figures = figures(&results, surface, "W");
     Answer { chosen, results, figures }
 }
@@ -151,7 +151,7 @@ fn facets_that_blur_a_lamp_say_by_how_much() {
     let results = simulate(&bound, &octree, &run, &|_| true);
     let few = RunSettings { rays: 16_384, replicates: 64, ..run };
     let error = geometric_error(&bound, [&octree, source.exact()], &few);
-    let all = figures(&results, Surface::Facets(&error), "lm");
+    let all = figures(&results, TracedGeometry::Facets(&error), "lm");
     let max = named(&all[0], "max");
     let off = (max.value - truth).abs();
     assert!(off > 3.0 * max.statistical, "the facets of this test are too good: {max:?}");
@@ -161,13 +161,13 @@ fn facets_that_blur_a_lamp_say_by_how_much() {
     elsewhere.receivers[0].peak = Paired { facets: 1.0, spline: 1.0, error: 0.0 };
     let cells = &results.receivers[0].cells;
     let brightest = (0..cells.len()).max_by(|&a, &b| cells[a].total_cmp(&cells[b])).unwrap();
-    let all = figures(&results, Surface::Facets(&elsewhere), "lm");
+    let all = figures(&results, TracedGeometry::Facets(&elsewhere), "lm");
     let geometric = named(&all[0], "max").geometric.unwrap();
     assert!(geometric > 0.0 && geometric >= error.receivers[0].cells[brightest], "{geometric}");
     // Of light that none of the comparing rays met nothing is known but that it came.
     let mut unmet = error.clone();
     unmet.receivers[0].power = Paired::default();
-    let all = figures(&results, Surface::Facets(&unmet), "lm");
+    let all = figures(&results, TracedGeometry::Facets(&unmet), "lm");
     let width = results.receivers[0].rms[0].hypot(results.receivers[0].rms[1]);
     let expected = [("max", results.receivers[0].max), ("rms_1", width), ("centroid_2", width)];
     for (name, unknown) in expected {
@@ -179,7 +179,7 @@ fn facets_that_blur_a_lamp_say_by_how_much() {
     let receiver = &mut dark.receivers[0];
     (receiver.power, receiver.max) = (0.0, 0.0);
     receiver.cells.fill(0.0);
-    let all = figures(&dark, Surface::Facets(&unmet), "lm");
+    let all = figures(&dark, TracedGeometry::Facets(&unmet), "lm");
     assert!(
         named(&all[0], "max").geometric.is_some_and(|g| g > 0.0)
             && named(&all[0], "power").geometric.unwrap() > 0.0
@@ -232,7 +232,9 @@ fn what_a_black_ball_takes_is_judged_without_a_receiver() {
     assert_eq!(answer.chosen.intersector, "exact", "{}", answer.chosen.because);
     let tried = &answer.chosen.alternatives[0];
     assert!(tried.figure.starts_with("ball") && tried.figure.ends_with("absorbed in faces"), "{tried:?}");
-    let [on_spline] = &power_figures(&answer.results, Surface::Spline, "W").by_body[..] else { panic!("one body") };
+    let [on_spline] = &power_figures(&answer.results, TracedGeometry::Spline, "W").by_body[..] else {
+        panic!("one body")
+    };
     assert!((on_spline.value - 0.25).abs() < 3.0 * on_spline.combined(), "{on_spline:?}");
 
     // On facets that were asked for.
@@ -242,7 +244,7 @@ fn what_a_black_ball_takes_is_judged_without_a_receiver() {
     let results = simulate(&bound, &octree, &run, &|_| true);
     let few = RunSettings { rays: 16_384, replicates: 64, ..run };
     let error = geometric_error(&bound, [&octree, source.exact()], &few);
-    let surface = Surface::Facets(&error);
+    let surface = TracedGeometry::Facets(&error);
     let power = power_figures(&results, surface, "W");
     let [body] = &power.by_body[..] else { panic!("one body") };
     let off = (body.value - 0.25).abs();
@@ -254,7 +256,7 @@ fn what_a_black_ball_takes_is_judged_without_a_receiver() {
         assert!(off > 10.0 * sum.statistical && off < 3.0 * sum.combined(), "{sum:?}, truly {truth}");
     }
     // Facets that nobody compared tell nothing of their error.
-    let unmeasured = power_figures(&results, Surface::Unmeasured, "W");
+    let unmeasured = power_figures(&results, TracedGeometry::Unmeasured, "W");
     assert!(unmeasured.by_body[0].geometric.is_none() && unmeasured.escaped.geometric.is_none());
 }
 
@@ -292,7 +294,7 @@ fn what_a_glass_takes_is_judged_without_a_receiver() {
     let chord = 2.0 * k;
     let truth = 0.25 * (1.0 - 2.0 * (1.0 - (1.0 + chord) * f64::exp(-chord)) / (chord * chord));
     assert!(answer.chosen.alternatives[0].figure.ends_with("absorbed in glass"), "{:?}", answer.chosen);
-    let surface = answer.chosen.geometric.as_ref().map_or(Surface::Spline, Surface::Facets);
+    let surface = answer.chosen.geometric.as_ref().map_or(TracedGeometry::Spline, TracedGeometry::Facets);
     let [glass] = &power_figures(&answer.results, surface, "W").by_body[..] else { panic!("one medium") };
     assert!((glass.value - truth).abs() < 3.0 * glass.combined(), "{glass:?}, truly {truth}");
 }
@@ -308,7 +310,7 @@ fn facets_change_a_bin_as_they_change_its_light() {
     assert_eq!(full.total, error.receivers[0].power);
     assert_eq!(full.cells, error.receivers[0].cells);
     assert!(full.cells.iter().any(|&c| c > 0.0));
-    let figures = figures(&results, Surface::Facets(&error), "W");
+    let figures = figures(&results, TracedGeometry::Facets(&error), "W");
     let bin = named(&figures[0], "500-700 nm");
     assert_eq!((bin.value, bin.geometric), (figures[0].power.value, figures[0].power.geometric));
 }
@@ -393,14 +395,14 @@ fn figures_of_random_scenes_are_those_of_the_spline_with_other_seeds() {
         let source = ModelMeshSource::new(&known.model);
         let run = RunSettings { rays: 100_000, ..settings };
         let other = simulate(&bound, source.exact(), &RunSettings { seed: 1000 + index, ..run.clone() }, &|_| true);
-        let truth = figures(&other, Surface::Spline, "W");
+        let truth = figures(&other, TracedGeometry::Spline, "W");
         let answer = default_answer(&known, run.rays, 0);
         let mesh = tessellate(&known.model, &tessellate::Settings::default()).mesh;
         let octree = Octree::build(&mesh, &octree::Settings::default());
         let results = simulate(&bound, &octree, &run, &|_| true);
         let few = RunSettings { rays: 16_384, replicates: 64, ..run.clone() };
         let error = geometric_error(&bound, [&octree, source.exact()], &few);
-        let on_facets = figures(&results, Surface::Facets(&error), "W");
+        let on_facets = figures(&results, TracedGeometry::Facets(&error), "W");
         for (k, found) in [&answer.figures, &on_facets].into_iter().enumerate() {
             for ((name, figure), (_, true_figure)) in found[0].named().zip(truth[0].named()) {
                 count[k] += 1;
