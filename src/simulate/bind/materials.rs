@@ -4,7 +4,7 @@ use super::chosen::ChosenRules;
 use crate::model::Model;
 use crate::optics::{Coating, Scatter};
 use crate::simulate::body::AMBIENT;
-use crate::simulate::scene::{Key, Material, Scene, SurfaceKind};
+use crate::simulate::scene::{Key, Material, Scene, SurfaceOptics};
 use crate::simulate::surfaces::{Coated, Surface};
 use crate::simulate::{Error, ErrorKind};
 
@@ -68,16 +68,16 @@ impl<'s> SurfaceTable<'s> {
 /// When the rule's optical values do not go together or are out of range.
 fn surface(scene: &Scene, rule: &Material) -> Result<Surface, Error> {
     let (coating, scatter) = rule.optics().map_err(|(_, e)| scene.error(ErrorKind::Value, &[], e))?;
-    let kind = rule.surface.unwrap_or(SurfaceKind::Interface);
+    let kind = rule.surface.unwrap_or(SurfaceOptics::Interface);
     // What scatters nothing and reflects nothing is named neither rough nor a mirror.
     let scatter = scatter.filter(Scatter::scatters);
     Ok(match (kind, coating, scatter) {
-        (SurfaceKind::Absorber, ..) => Surface::Absorber,
-        (SurfaceKind::Mirror | SurfaceKind::Diffuse, Coating::Ideal { reflectance: 0.0, .. }, _) => {
+        (SurfaceOptics::Absorber, ..) => Surface::Absorber,
+        (SurfaceOptics::Mirror | SurfaceOptics::Diffuse, Coating::Ideal { reflectance: 0.0, .. }, _) => {
             Surface::Absorber
         }
         (_, Coating::Bare, None) => Surface::Interface,
-        (SurfaceKind::Mirror, Coating::Ideal { reflectance, .. }, None) => Surface::Mirror(reflectance),
+        (SurfaceOptics::Mirror, Coating::Ideal { reflectance, .. }, None) => Surface::Mirror(reflectance),
         (_, coating, scatter) => {
             let opaque = coating.is_opaque();
             Surface::Coated(Box::new(Coated { coating, scatter, opaque }))
@@ -107,7 +107,7 @@ pub(super) fn check_interfaces(
     bodies: &[u32],
 ) -> Result<(), Error> {
     for ((f, (rule, _)), &body) in model.placed_faces().zip(chosen).zip(bodies) {
-        let Some(i) = rule.filter(|&r| scene.materials[r].surface == Some(SurfaceKind::Interface)) else {
+        let Some(i) = rule.filter(|&r| scene.materials[r].surface == Some(SurfaceOptics::Interface)) else {
             continue;
         };
         if body == AMBIENT {

@@ -2,7 +2,7 @@
 
 use super::bound_scene::RuleFaces;
 use super::chosen::ChosenRules;
-use crate::simulate::scene::{Scene, SurfaceKind};
+use crate::simulate::scene::{Scene, SurfaceOptics};
 
 /// Returns one entry for each rule, in the order of the scene and with faces or without, and a last one for the faces that no rule names,
 /// if there are any. A face whose surface and medium come from two rules stands in both entries.
@@ -34,7 +34,7 @@ pub(super) fn rule_table(scene: &Scene, chosen: &ChosenRules) -> Vec<RuleFaces> 
     }
     if !unnamed.is_empty() {
         let gives = match scene.default_surface {
-            SurfaceKind::Absorber => "surface absorber: light that meets them ends there".to_owned(),
+            SurfaceOptics::Absorber => "surface absorber: light that meets them ends there".to_owned(),
             other => format!("surface {}, the scene's default_surface", surface_word(other)),
         };
         let selects = "no rule names them".to_owned();
@@ -44,13 +44,13 @@ pub(super) fn rule_table(scene: &Scene, chosen: &ChosenRules) -> Vec<RuleFaces> 
 }
 
 /// Returns the word that the scene file has for a surface.
-fn surface_word(kind: SurfaceKind) -> &'static str {
+fn surface_word(kind: SurfaceOptics) -> &'static str {
     match kind {
-        SurfaceKind::Absorber => "absorber",
-        SurfaceKind::Mirror => "mirror",
-        SurfaceKind::Interface => "interface",
-        SurfaceKind::Diffuse => "diffuse",
-        SurfaceKind::Coating => "coating",
-        SurfaceKind::Metal => "metal",
+        SurfaceOptics::Absorber => "absorber",
+        SurfaceOptics::Mirror => "mirror",
+        SurfaceOptics::Interface => "interface",
+        SurfaceOptics::Diffuse => "diffuse",
+        SurfaceOptics::Coating => "coating",
+        SurfaceOptics::Metal => "metal",
     }
 }

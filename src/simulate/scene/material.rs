@@ -116,7 +116,7 @@ pub struct Material {
     /// Name of the medium inside; its faces become interfaces unless `surface` says otherwise.
     pub medium: Option<String>,
     /// What happens at the surface.
-    pub surface: Option<SurfaceKind>,
+    pub surface: Option<SurfaceOptics>,
     /// Share of the power that is reflected: constant, `[[angle_deg, share], …]` or `[[angle_deg, nm, share], …]` over a full
     /// grid. 1 for mirrors and diffuse faces, 0 for coatings unless said otherwise.
     pub reflectance: Option<Reflectance>,
@@ -205,10 +205,11 @@ pub enum Reflectance {
 
 /// What happens to light at a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+// The schema keeps its definition under the old name; `model::SurfaceKind`, the shape, has no part in it.
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(rename = "SurfaceKind"))]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
-pub enum SurfaceKind {
+pub enum SurfaceOptics {
     /// Light ends here.
     #[default]
     Absorber,

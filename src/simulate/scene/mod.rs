@@ -23,7 +23,7 @@ use super::{Error, ErrorKind};
 use crate::formats::file_stem;
 pub(crate) use locate::Key;
 use locate::TableKeys;
-pub use material::{LobeKind, Material, ModelUse, Placement, Reflectance, ScatterKey, SurfaceKind};
+pub use material::{LobeKind, Material, ModelUse, Placement, Reflectance, ScatterKey, SurfaceOptics};
 pub use medium::{ByWavelength, Medium};
 pub use origin::Origin;
 pub use receiver::{Channels, FarFieldType, Receiver, ReceiverKind};
@@ -82,7 +82,7 @@ pub struct Scene {
     #[serde(rename = "material")]
     pub materials: Vec<Material>,
     /// What every other face is: `absorber` unless said otherwise.
-    pub default_surface: SurfaceKind,
+    pub default_surface: SurfaceOptics,
     /// Name of the medium around everything; vacuum unless said otherwise.
     pub ambient: Option<String>,
     /// Where light comes from.
@@ -224,7 +224,7 @@ impl Scene {
         if let Some(name) = &self.ambient {
             medium::find(&self.media, name, &self.origin, &[Key::Name("ambient")])?;
         }
-        if matches!(self.default_surface, SurfaceKind::Coating | SurfaceKind::Metal) {
+        if matches!(self.default_surface, SurfaceOptics::Coating | SurfaceOptics::Metal) {
             let message = "this surface needs values, which `default_surface` cannot give";
             let error = self.error(ErrorKind::Value, &[Key::Name("default_surface")], message);
             return Err(error.help(

@@ -1,6 +1,6 @@
 //! Materials in the form that the laws of light read: coatings and scatter.
 
-use super::{Key, LobeKind, Material, Medium, Origin, Reflectance, SurfaceKind, medium};
+use super::{Key, LobeKind, Material, Medium, Origin, Reflectance, SurfaceOptics, medium};
 use crate::optics::fresnel::Power;
 use crate::optics::{Abg, Coating, CoatingTable, Lobe, Scatter, Split};
 use crate::simulate::{Error, ErrorKind};
@@ -15,11 +15,11 @@ impl Material {
     /// With the key that is wrong, and what is wrong with it.
     pub(crate) fn optics(&self) -> Result<(Coating, Option<Scatter>), (&'static str, String)> {
         // A boundary that says only its medium is a bare one.
-        let kind = self.surface.unwrap_or(SurfaceKind::Interface);
+        let kind = self.surface.unwrap_or(SurfaceOptics::Interface);
         let coating = match kind {
-            SurfaceKind::Absorber => Coating::ideal(0.0, 0.0).map_err(|e| ("surface", e.to_string())),
-            SurfaceKind::Interface => Ok(Coating::Bare),
-            SurfaceKind::Metal => match self.metal {
+            SurfaceOptics::Absorber => Coating::ideal(0.0, 0.0).map_err(|e| ("surface", e.to_string())),
+            SurfaceOptics::Interface => Ok(Coating::Bare),
+            SurfaceOptics::Metal => match self.metal {
                 Some([n, k]) if n > 0.0 && k >= 0.0 && n + k < LARGEST_INDEX => Ok(Coating::Metal { n, k }),
                 _ => Err((
                     "metal",
@@ -27,8 +27,8 @@ impl Material {
                         .into(),
                 )),
             },
-            SurfaceKind::Mirror | SurfaceKind::Diffuse => reflector(self.reflectance.as_ref(), 1.0, 0.0),
-            SurfaceKind::Coating => match &self.coating {
+            SurfaceOptics::Mirror | SurfaceOptics::Diffuse => reflector(self.reflectance.as_ref(), 1.0, 0.0),
+            SurfaceOptics::Coating => match &self.coating {
                 Some(rows) => coating_from_rows(rows).map_err(|e| ("coating", format!("in `coating`: {e}"))),
                 // A coating passes only what it says that it passes; the rest is absorbed.
                 None => reflector(self.reflectance.as_ref(), 0.0, self.transmittance.unwrap_or(0.0)),
@@ -37,7 +37,7 @@ impl Material {
         // The values first: a wrong reflectance is a better message than a key that does not belong.
         self.check_keys(kind)?;
         let scatter = match kind {
-            SurfaceKind::Diffuse => Some(Scatter { share: 1.0, lobe: Lobe::Lambertian }),
+            SurfaceOptics::Diffuse => Some(Scatter { share: 1.0, lobe: Lobe::Lambertian }),
             _ => self.scatter().map_err(|e| ("scatter", e))?,
         };
         Ok((coating, scatter))
@@ -47,16 +47,16 @@ impl Material {
     ///
     /// # Errors
     /// With the first that does not.
-    fn check_keys(&self, kind: SurfaceKind) -> Result<(), (&'static str, String)> {
-        let mirror = matches!(kind, SurfaceKind::Mirror | SurfaceKind::Diffuse);
-        let coated = kind == SurfaceKind::Coating;
-        let scatters = !matches!(kind, SurfaceKind::Diffuse | SurfaceKind::Absorber);
+    fn check_keys(&self, kind: SurfaceOptics) -> Result<(), (&'static str, String)> {
+        let mirror = matches!(kind, SurfaceOptics::Mirror | SurfaceOptics::Diffuse);
+        let coated = kind == SurfaceOptics::Coating;
+        let scatters = !matches!(kind, SurfaceOptics::Diffuse | SurfaceOptics::Absorber);
         // One table for all kinds: a key that is not asked about here would be ignored in silence.
         let keys = [
             ("reflectance", self.reflectance.is_some(), mirror || coated, "`surface` mirror, diffuse or coating"),
             ("transmittance", self.transmittance.is_some(), coated, "`surface = \"coating\"`"),
             ("coating", self.coating.is_some(), coated, "`surface = \"coating\"`"),
-            ("metal", self.metal.is_some(), kind == SurfaceKind::Metal, "`surface = \"metal\"`"),
+            ("metal", self.metal.is_some(), kind == SurfaceOptics::Metal, "`surface = \"metal\"`"),
             ("scatter", self.scatter.is_some(), scatters, "a surface that is neither diffuse nor black"),
         ];
         if let Some((key, _, _, owner)) = keys.into_iter().find(|(_, given, allowed, _)| *given && !allowed) {
