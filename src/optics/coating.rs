@@ -1,7 +1,7 @@
 //! What a coated interface reflects and transmits, by angle and wavelength.
 
 use super::error::{Error, ErrorKind, require, require_wavelength};
-use super::fresnel::{self, Power};
+use super::fresnel::{self, PowerShares};
 use super::refraction::cos_transmitted;
 use super::table::{bracket, check_increasing};
 
@@ -50,9 +50,9 @@ pub enum Coating {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Split {
     /// Reflected.
-    pub reflected: Power,
+    pub reflected: PowerShares,
     /// Transmitted.
-    pub transmitted: Power,
+    pub transmitted: PowerShares,
 }
 
 impl Split {
@@ -86,14 +86,14 @@ impl Coating {
             Self::Bare => {
                 let reflected = fresnel::dielectric(cos_i, eta);
                 // What bare glass does not reflect it lets through, in each polarisation by itself.
-                let transmitted = Power { rs: 1.0 - reflected.rs, rp: 1.0 - reflected.rp };
+                let transmitted = PowerShares { rs: 1.0 - reflected.rs, rp: 1.0 - reflected.rp };
                 return Split { reflected, transmitted };
             }
             Self::Metal { n, k } => {
-                return Split { reflected: fresnel::conductor(cos_i, n1, *n, *k), transmitted: Power::NONE };
+                return Split { reflected: fresnel::conductor(cos_i, n1, *n, *k), transmitted: PowerShares::NONE };
             }
             Self::Ideal { reflectance: r, transmittance: t } => {
-                Split { reflected: Power { rs: *r, rp: *r }, transmitted: Power { rs: *t, rp: *t } }
+                Split { reflected: PowerShares { rs: *r, rp: *r }, transmitted: PowerShares { rs: *t, rp: *t } }
             }
             Self::Table(table) => table.shares(table.angle_deg(cos_i, eta), wavelength_nm),
         };
@@ -102,7 +102,7 @@ impl Coating {
             return split;
         }
         let (r, t) = (split.reflected, split.transmitted);
-        Split { reflected: Power { rs: r.rs + t.rs, rp: r.rp + t.rp }, transmitted: Power::NONE }
+        Split { reflected: PowerShares { rs: r.rs + t.rs, rp: r.rp + t.rp }, transmitted: PowerShares::NONE }
     }
 
     /// Whether the shares depend on the wavelength beyond what the media's indices do.
@@ -125,7 +125,7 @@ impl Coating {
         match self {
             Self::Bare | Self::Metal { .. } => false,
             Self::Ideal { reflectance, .. } => *reflectance == 0.0,
-            Self::Table(t) => t.cells.iter().all(|c| c.reflected == Power::NONE),
+            Self::Table(t) => t.cells.iter().all(|c| c.reflected == PowerShares::NONE),
         }
     }
 }
@@ -187,7 +187,7 @@ impl CoatingTable {
         let (i, s) = bracket(&self.angles_deg, angle_deg);
         let (j, t) = bracket(&self.wavelengths_nm, wavelength_nm);
         let columns = self.wavelengths_nm.len();
-        let mut sum = Split { reflected: Power::NONE, transmitted: Power::NONE };
+        let mut sum = Split { reflected: PowerShares::NONE, transmitted: PowerShares::NONE };
         for (row, a) in [(i, 1.0 - s), (i + 1, s)] {
             for (column, b) in [(j, 1.0 - t), (j + 1, t)] {
                 let weight = a * b;
@@ -204,7 +204,7 @@ impl CoatingTable {
 
     /// Whether no cell transmits anything.
     fn is_opaque(&self) -> bool {
-        self.cells.iter().all(|c| c.transmitted == Power::NONE)
+        self.cells.iter().all(|c| c.transmitted == PowerShares::NONE)
     }
 
     /// The angle that the table is read at, degrees: in the rarer medium, 90 beyond the critical angle, that of incidence if it is opaque.
@@ -219,8 +219,8 @@ impl CoatingTable {
 mod tests {
     use super::*;
 
-    fn same(x: f64) -> Power {
-        Power { rs: x, rp: x }
+    fn same(x: f64) -> PowerShares {
+        PowerShares { rs: x, rp: x }
     }
 
     fn table() -> Coating {
@@ -259,9 +259,9 @@ mod tests {
     #[test]
     fn what_cannot_be_transmitted_is_reflected() {
         let s = Coating::ideal(0.0, 1.0).unwrap().split(0.5, 1.5, 1.0, 550.0);
-        assert_eq!((s.reflected, s.transmitted), (same(1.0), Power::NONE));
+        assert_eq!((s.reflected, s.transmitted), (same(1.0), PowerShares::NONE));
         let s = table().split(0.5, 1.5, 1.0, 450.0);
-        assert!((s.reflected.rs - 0.98).abs() < 1e-12 && s.transmitted == Power::NONE);
+        assert!((s.reflected.rs - 0.98).abs() < 1e-12 && s.transmitted == PowerShares::NONE);
         let mirror = Coating::ideal(0.95, 0.0).unwrap().split(0.5, 1.5, 1.0, 550.0);
         assert_eq!(mirror.reflected, same(0.95));
     }
@@ -269,8 +269,10 @@ mod tests {
     /// Vendors print shares with four digits, whose roundings add up.
     #[test]
     fn rounded_shares_lose_what_is_too_much() {
-        let row =
-            |rs: f64, ts: f64| Split { reflected: Power { rs, rp: 0.1 }, transmitted: Power { rs: ts, rp: 0.9 } };
+        let row = |rs: f64, ts: f64| Split {
+            reflected: PowerShares { rs, rp: 0.1 },
+            transmitted: PowerShares { rs: ts, rp: 0.9 },
+        };
         let table = |row| CoatingTable::new(vec![0.0, 30.0], vec![500.0, 550.0], vec![row; 4]);
         let read = table(row(0.0274, 0.9727)).unwrap().shares(30.0, 500.0);
         assert!((read.transmitted.rs - 0.9726).abs() < 1e-15 && read.absorbed().abs() < 1e-15, "{read:?}");

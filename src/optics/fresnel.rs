@@ -6,14 +6,14 @@ use super::refraction::cos_transmitted;
 
 /// Shares of power (reflected, unless said otherwise), for light polarised across (s) and in (p) the plane of incidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Power {
+pub struct PowerShares {
     /// Electric field perpendicular to the plane of incidence.
     pub rs: f64,
     /// Electric field in the plane of incidence.
     pub rp: f64,
 }
 
-impl Power {
+impl PowerShares {
     /// All power reflected.
     pub const TOTAL: Self = Self { rs: 1.0, rp: 1.0 };
 
@@ -35,29 +35,29 @@ impl Power {
 
 /// Reflected shares at an interface of two transparent media; what is not reflected is transmitted.
 ///
-/// `cos_i` in `[0, 1]`, `eta = n1/n2` as for [`super::refract`]. [`Power::TOTAL`] at and beyond the critical angle.
+/// `cos_i` in `[0, 1]`, `eta = n1/n2` as for [`super::refract`]. [`PowerShares::TOTAL`] at and beyond the critical angle.
 ///
 /// ```
 /// let r = lampyris::optics::fresnel::dielectric(1.0, 1.0 / 1.5);
 /// assert!((r.unpolarised() - 0.04).abs() < 1e-15);
 /// ```
 #[inline]
-pub fn dielectric(cos_i: f64, eta: f64) -> Power {
-    cos_transmitted(cos_i, eta).map_or(Power::TOTAL, |cos_t| of_cosines(cos_i, cos_t, eta))
+pub fn dielectric(cos_i: f64, eta: f64) -> PowerShares {
+    cos_transmitted(cos_i, eta).map_or(PowerShares::TOTAL, |cos_t| of_cosines(cos_i, cos_t, eta))
 }
 
 /// As [`dielectric`] where the cosine of the angle of refraction is known; NaN where both cosines are zero.
 #[inline]
-pub fn of_cosines(cos_i: f64, cos_t: f64, eta: f64) -> Power {
+pub fn of_cosines(cos_i: f64, cos_t: f64, eta: f64) -> PowerShares {
     let rs = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
     let rp = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-    Power { rs: rs * rs, rp: rp * rp }
+    PowerShares { rs: rs * rs, rp: rp * rp }
 }
 
 /// Reflected shares at a metal of complex index `n + i·k` seen from a medium of index `outside`; the rest is absorbed.
 ///
 /// `cos_i` in `[0, 1]`. With `k = 0` it agrees with [`dielectric`].
-pub fn conductor(cos_i: f64, outside: f64, n: f64, k: f64) -> Power {
+pub fn conductor(cos_i: f64, outside: f64, n: f64, k: f64) -> PowerShares {
     let (eta, kappa) = (n / outside, k / outside);
     let (cos2, sin2) = (cos_i * cos_i, (1.0 - cos_i) * (1.0 + cos_i));
     // a² and b² are real and imaginary part of the refracted normal component.
@@ -67,7 +67,7 @@ pub fn conductor(cos_i: f64, outside: f64, n: f64, k: f64) -> Power {
     let rs = (length - 2.0 * a * cos_i + cos2) / (length + 2.0 * a * cos_i + cos2);
     let (p, q) = (cos2 * length + sin2 * sin2, 2.0 * a * cos_i * sin2);
     let rp = if cos_i == 0.0 { 1.0 } else { rs * (p - q) / (p + q) };
-    Power { rs: rs.clamp(0.0, 1.0), rp: rp.clamp(0.0, 1.0) }
+    PowerShares { rs: rs.clamp(0.0, 1.0), rp: rp.clamp(0.0, 1.0) }
 }
 
 #[cfg(test)]
@@ -111,11 +111,11 @@ mod tests {
     #[test]
     fn everything_is_reflected_from_the_critical_angle_on() {
         let critical = (1.0 / 1.5f64).asin();
-        assert_eq!(dielectric((critical + 1e-11).cos(), 1.5), Power::TOTAL);
+        assert_eq!(dielectric((critical + 1e-11).cos(), 1.5), PowerShares::TOTAL);
         let before = dielectric((critical - 1e-11).cos(), 1.5);
         assert!(before.rs < 1.0 && before.rp < 1.0 && before.rs > 0.9999);
-        assert_eq!(dielectric(0.0, 1.5), Power::TOTAL);
-        assert_eq!(dielectric(0.0, 1.0 / 1.5), Power::TOTAL);
+        assert_eq!(dielectric(0.0, 1.5), PowerShares::TOTAL);
+        assert_eq!(dielectric(0.0, 1.0 / 1.5), PowerShares::TOTAL);
     }
 
     #[test]

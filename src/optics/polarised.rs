@@ -121,7 +121,7 @@ impl Mueller {
     }
 
     /// The matrix of the power shares of s and p alone, without a phase between them: a tabulated coating.
-    pub fn without_phase(power: super::fresnel::Power) -> Self {
+    pub fn without_phase(power: super::fresnel::PowerShares) -> Self {
         Self::from_amplitudes(Complex::real(power.rs.sqrt()), Complex::real(power.rp.sqrt()), 1.0)
     }
 }

@@ -1,7 +1,7 @@
 //! Materials in the form that the laws of light read: coatings and scatter.
 
 use super::{Key, LobeKind, Material, Medium, Origin, Reflectance, SurfaceOptics, medium};
-use crate::optics::fresnel::Power;
+use crate::optics::fresnel::PowerShares;
 use crate::optics::{Abg, Coating, CoatingTable, Lobe, Scatter, Split};
 use crate::simulate::{Error, ErrorKind};
 
@@ -132,8 +132,8 @@ impl Material {
 /// With the key they belong to.
 fn reflector(r: Option<&Reflectance>, unset: f64, transmittance: f64) -> Result<Coating, (&'static str, String)> {
     let same = |r: f64| Split {
-        reflected: Power { rs: r, rp: r },
-        transmitted: Power { rs: transmittance, rp: transmittance },
+        reflected: PowerShares { rs: r, rp: r },
+        transmitted: PowerShares { rs: transmittance, rp: transmittance },
     };
     match r {
         None => Coating::ideal(unset, transmittance).map_err(|e| ("transmittance", e.to_string())),
@@ -162,11 +162,12 @@ fn reflector(r: Option<&Reflectance>, unset: f64, transmittance: f64) -> Result<
 /// When a row has another length, or they make no full grid.
 fn coating_from_rows(rows: &[Vec<f64>]) -> Result<Coating, String> {
     let cells = rows.iter().map(|row| match row[..] {
-        [a, nm, r, t] => {
-            Ok(([a, nm], Split { reflected: Power { rs: r, rp: r }, transmitted: Power { rs: t, rp: t } }))
-        }
+        [a, nm, r, t] => Ok((
+            [a, nm],
+            Split { reflected: PowerShares { rs: r, rp: r }, transmitted: PowerShares { rs: t, rp: t } },
+        )),
         [a, nm, rs, rp, ts, tp] => {
-            Ok(([a, nm], Split { reflected: Power { rs, rp }, transmitted: Power { rs: ts, rp: tp } }))
+            Ok(([a, nm], Split { reflected: PowerShares { rs, rp }, transmitted: PowerShares { rs: ts, rp: tp } }))
         }
         _ => Err(format!("a row has {} numbers, not 4 or 6", row.len())),
     });
