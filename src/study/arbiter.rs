@@ -37,7 +37,7 @@ const PAIR_ROUNDING: f64 = 1.0 / (1u128 << 90) as f64;
 
 /// Which of two differing answers is right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
+pub enum Arbitration {
     /// The first alone.
     First,
     /// The second alone.
@@ -52,7 +52,7 @@ pub fn same_distance(a: f64, b: f64) -> bool {
 }
 
 /// Judges two answers to one ray, on all facets of the mesh; `None` is a miss. Undecided where both are right, or both wrong.
-pub fn arbitrate(mesh: &FacetMesh, ray: &Ray, first: Option<&Hit>, second: Option<&Hit>) -> Verdict {
+pub fn arbitrate(mesh: &FacetMesh, ray: &Ray, first: Option<&Hit>, second: Option<&Hit>) -> Arbitration {
     let mut met = Vec::new();
     // All of them: a tree here could share the fault of the trees that are judged.
     for f in (0..mesh.facets.len()).filter(|&f| passes_near(ray, &mesh.corners(f))) {
@@ -78,9 +78,9 @@ pub fn arbitrate(mesh: &FacetMesh, ray: &Ray, first: Option<&Hit>, second: Optio
     };
     // Two right answers may differ at a silhouette; two wrong ones tell nothing of either.
     match (holds(first), holds(second)) {
-        (true, false) => Verdict::First,
-        (false, true) => Verdict::Second,
-        _ => Verdict::Undecided,
+        (true, false) => Arbitration::First,
+        (false, true) => Arbitration::Second,
+        _ => Arbitration::Undecided,
     }
 }
 
@@ -259,24 +259,28 @@ mod tests {
         let (upper, lower) = (hit(2.0), hit(3.0));
         let down = Ray::new(Point::new(0.3, 0.4, 2.0), -Vector::Z);
         let beside = Ray::new(Point::new(1.0 + 1e-9, 0.4, 2.0), -Vector::Z);
-        assert_eq!(arbitrate(&mesh, &down, Some(&lower), Some(&upper)), Verdict::Second);
-        assert_eq!(arbitrate(&mesh, &down, Some(&upper), None), Verdict::First);
-        assert_eq!(arbitrate(&mesh, &beside, Some(&upper), None), Verdict::Second);
-        assert_eq!(arbitrate(&mesh, &down.with_range(0.0, 1.0), None, Some(&upper)), Verdict::First);
-        assert_eq!(arbitrate(&mesh, &down.with_range(2.5, 9.0), Some(&upper), Some(&lower)), Verdict::Second);
+        assert_eq!(arbitrate(&mesh, &down, Some(&lower), Some(&upper)), Arbitration::Second);
+        assert_eq!(arbitrate(&mesh, &down, Some(&upper), None), Arbitration::First);
+        assert_eq!(arbitrate(&mesh, &beside, Some(&upper), None), Arbitration::Second);
+        assert_eq!(arbitrate(&mesh, &down.with_range(0.0, 1.0), None, Some(&upper)), Arbitration::First);
+        assert_eq!(arbitrate(&mesh, &down.with_range(2.5, 9.0), Some(&upper), Some(&lower)), Arbitration::Second);
     }
 
     #[test]
     fn a_ray_on_an_edge_is_a_hit_and_on_the_border_may_be() {
         let mesh = sheets();
         let diagonal = Ray::new(Point::new(0.25, 0.25, 2.0), -Vector::Z);
-        assert_eq!(arbitrate(&mesh, &diagonal, Some(&hit(2.0)), None), Verdict::First);
+        assert_eq!(arbitrate(&mesh, &diagonal, Some(&hit(2.0)), None), Arbitration::First);
         let border = Ray::new(Point::new(1.0 + 1e-15, 0.3, 2.0), -Vector::Z);
-        assert_eq!(arbitrate(&mesh, &border, Some(&hit(2.0)), None), Verdict::Undecided);
+        assert_eq!(arbitrate(&mesh, &border, Some(&hit(2.0)), None), Arbitration::Undecided);
         // Both halves of a quad meet at two of its corners, and the border all the same.
         for (x, y) in [(0.0, 0.0), (1.0, 1.0), (1.0, 0.0)] {
             let corner = Ray::new(Point::new(x, y, 2.0), -Vector::Z);
-            assert_eq!(arbitrate(&mesh, &corner, None, Some(&hit(2.0))), Verdict::Undecided, "corner ({x}, {y})");
+            assert_eq!(
+                arbitrate(&mesh, &corner, None, Some(&hit(2.0))),
+                Arbitration::Undecided,
+                "corner ({x}, {y})"
+            );
         }
     }
 
@@ -291,10 +295,10 @@ mod tests {
             mesh.facets.push(Facet { vertices: [k, k + 1, k + 4, k + 3], face: FaceId(0) });
         }
         let middle = Ray::new(Point::new(0.0, 0.0, 2.0), -Vector::Z);
-        assert_eq!(arbitrate(&mesh, &middle, Some(&hit(2.0)), None), Verdict::First);
+        assert_eq!(arbitrate(&mesh, &middle, Some(&hit(2.0)), None), Arbitration::First);
         // With one of the four gone, the corner is on the border.
         mesh.facets.pop();
-        assert_eq!(arbitrate(&mesh, &middle, Some(&hit(2.0)), None), Verdict::Undecided);
+        assert_eq!(arbitrate(&mesh, &middle, Some(&hit(2.0)), None), Arbitration::Undecided);
     }
 
     #[test]
@@ -302,7 +306,7 @@ mod tests {
         let mesh = sheets();
         for end in [2.0 - 4.0 * f64::EPSILON, 2.0, 2.0 + 4.0 * f64::EPSILON] {
             let down = Ray::new(Point::new(0.3, 0.4, 2.0), -Vector::Z).with_range(0.0, end);
-            assert_eq!(arbitrate(&mesh, &down, Some(&hit(2.0)), None), Verdict::Undecided, "range to {end}");
+            assert_eq!(arbitrate(&mesh, &down, Some(&hit(2.0)), None), Arbitration::Undecided, "range to {end}");
         }
     }
 

@@ -6,7 +6,7 @@ use lampyris::intersect::octree::{self, Octree};
 use lampyris::intersect::{Cost, Hit, Intersector};
 use lampyris::math::{Departure, Point, QuadHalf, Ray, Uv, Vector};
 use lampyris::mesh::FacetMesh;
-use lampyris::study::arbiter::{Verdict, arbitrate};
+use lampyris::study::arbiter::{Arbitration, arbitrate};
 use lampyris::study::rays::RaySource;
 use lampyris::study::surface_rays::SurfacePaths;
 use lampyris::{step, tessellate};
@@ -95,7 +95,7 @@ fn starts_on_edges_and_corners_are_right_with_twice_the_digits() {
             let impossible = Hit { t: -1.0, ..octree.intersect(&toward(&mesh), &mut Cost::default()).unwrap() };
             let ahead = ray.with_range(NEAR, f64::INFINITY);
             let verdict = arbitrate(&mesh, &ahead, hit.as_ref(), Some(&impossible));
-            assert_eq!(verdict, Verdict::First, "{start:?} {ray:?} {hit:?}");
+            assert_eq!(verdict, Arbitration::First, "{start:?} {ray:?} {hit:?}");
         }
     }
     assert!(hits_at_start > 10, "concave edges are among them: {hits_at_start}");

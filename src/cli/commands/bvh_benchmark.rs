@@ -18,7 +18,7 @@ use crate::intersect::{Cost, Footprint, Hit, Intersector};
 use crate::math::{Aabb, Ray};
 use crate::mesh::FacetMesh;
 use crate::pipeline::{MeshingSettings, TracingSettings};
-use crate::study::arbiter::{Verdict, arbitrate, same_distance};
+use crate::study::arbiter::{Arbitration, arbitrate, same_distance};
 use crate::study::cross_check::{TimedIntersector, measure};
 use crate::study::rays::{Bounces, Camera, RaySource, Uniform};
 use crate::study::surface_rays::SurfacePaths;
@@ -359,15 +359,15 @@ impl Comparison {
             _ => false,
         };
         let differing: Vec<usize> = (0..rays.len()).filter(|&i| !same(&octree[i], &hits[i])).collect();
-        let verdicts: Vec<Verdict> = (differing.par_iter())
+        let verdicts: Vec<Arbitration> = (differing.par_iter())
             .map(|&i| arbitrate(mesh, &rays[i], octree[i].as_ref(), hits[i].as_ref()))
             .collect();
-        let count = |which: Verdict| verdicts.iter().filter(|v| **v == which).count();
+        let count = |which: Arbitration| verdicts.iter().filter(|v| **v == which).count();
         Self {
             differs: differing.len(),
-            wrong: count(Verdict::First),
-            octree_wrong: count(Verdict::Second),
-            undecided: count(Verdict::Undecided),
+            wrong: count(Arbitration::First),
+            octree_wrong: count(Arbitration::Second),
+            undecided: count(Arbitration::Undecided),
         }
     }
 }
