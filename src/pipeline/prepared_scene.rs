@@ -18,7 +18,7 @@ use crate::intersect::{Intersector, NormalMode};
 use crate::mesh::FacetMesh;
 use crate::model::{Instancing, Model};
 use crate::simulate::{
-    BoundScene, Fingerprint, Hooks, PartialRun, PathSink, Progress, RunSettings, Scene, Traced, grows,
+    BoundScene, Fingerprint, Hooks, PartialRun, PathSink, Progress, RunSettings, Scene, TracedRun, grows,
     replicate_range, trace,
 };
 use crate::study::default_accuracy::TracingChoice;
@@ -365,7 +365,7 @@ impl PreparedScene {
         settings: &RunSettings,
         request: TraceRequest<'_>,
         monitor: &dyn Monitor,
-    ) -> Traced {
+    ) -> TracedRun {
         monitor.begin(Stage::Tracing(settings.rays));
         let progress = |p: Progress| monitor.advance(p.rays, p.total);
         let hooks = Hooks {

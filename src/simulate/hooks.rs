@@ -45,7 +45,7 @@ impl<'a> Hooks<'a> {
 
 /// A run, or the part of it that was asked for.
 #[derive(Clone, Debug, Default)]
-pub struct Traced {
+pub struct TracedRun {
     /// The replicates that are done, and their sums.
     pub partial: PartialRun,
     /// Work of the intersector.

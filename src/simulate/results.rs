@@ -5,7 +5,7 @@ use super::digest::digest;
 use super::dispatch::kernel_kind;
 use super::effects::{EffectReason, RequiredEffects};
 use super::face_results::FaceResults;
-use super::hooks::Traced;
+use super::hooks::TracedRun;
 use super::outcome::{Counts, LostRay, PathVertex};
 use super::plan::Plan;
 use super::power_scale::{HALF_QUANTUM, PowerScale};
@@ -152,10 +152,10 @@ pub struct Absorbed {
 impl Results {
     /// Makes the results of a run, or of the part of it that was traced: powers are scaled to what all sources emit. Stages other than
     /// `trace` have 0 seconds.
-    pub fn new(bound: &BoundScene, settings: &RunSettings, traced: Traced) -> Self {
+    pub fn new(bound: &BoundScene, settings: &RunSettings, traced: TracedRun) -> Self {
         let plan = Plan::new(bound, settings);
         let required = RequiredEffects::new(bound);
-        let Traced { partial, cost, threads } = traced;
+        let TracedRun { partial, cost, threads } = traced;
         let trace = partial.seconds;
         let mut tallies = partial.tallies;
         // A run that was stopped early, or is one shard of many, answers for the rays it traced.

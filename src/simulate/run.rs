@@ -5,7 +5,7 @@ use super::dispatch::{self, kernel_kind};
 use super::effects::KernelKind;
 use super::emitter::Emitter;
 use super::gather::{Gathering, ThreadSums};
-use super::hooks::{Hooks, Progress, Traced};
+use super::hooks::{Hooks, Progress, TracedRun};
 use super::kernel::{Context, RaySelection};
 use super::partial_run::PartialRun;
 use super::path_sample::PathSample;
@@ -44,7 +44,7 @@ pub fn trace(
     settings: &RunSettings,
     from: Option<PartialRun>,
     hooks: &Hooks<'_>,
-) -> Traced {
+) -> TracedRun {
     let start = Instant::now();
     let single = RunSettings { batch: 1, ..settings.clone() };
     let mut context = Context::new(bound, intersector, settings);
@@ -96,7 +96,7 @@ pub fn trace(
         work.run(&gathering);
     });
     let (partial, cost) = gathering.into_partial_run();
-    Traced { partial, cost, threads }
+    TracedRun { partial, cost, threads }
 }
 
 /// Returns the contiguous part of `all` that shard number `shard`, from 0, of `shards` traces: the parts are disjoint and make up `all`.
@@ -206,7 +206,7 @@ pub fn replay(bound: &BoundScene, intersector: &dyn Intersector, settings: &RunS
     partial.tallies.take(&mut tally, bound);
     partial.tallies.sort_paths();
     partial.seconds = start.elapsed().as_secs_f64();
-    Results::new(bound, settings, Traced { partial, cost, threads: 1 })
+    Results::new(bound, settings, TracedRun { partial, cost, threads: 1 })
 }
 
 /// Rays that are traced together where nothing of them is kept: their paths are a few megabytes.

@@ -3,7 +3,7 @@
 use super::geometry::{bspline_surface, nurbs_surface, point, vector};
 use super::modeling::{Plane, Surface as TruckSurface};
 use super::revolve::{Revolved, Side};
-use super::trace::{ACCEPTED, Tracer};
+use super::trace::{ACCEPTED, EdgeTracer};
 use crate::math::{Frame, Point, Uv};
 use crate::model::{Analytic, EdgeId, EdgeUse, Face, TrimLoop};
 use crate::nurbs::{ControlPoint, Curve, Surface, UvCurve, sweep};
@@ -113,7 +113,7 @@ fn spline_parts(
     wires: &[Vec<WireEdge>],
     middles: Option<&[Vec<f64>]>,
 ) -> Result<Parts, String> {
-    let tracer = Tracer::new(&surface);
+    let tracer = EdgeTracer::new(&surface);
     let mut gap = 0f64;
     let mut loops = Vec::new();
     for (i, wire) in wires.iter().enumerate() {

@@ -23,7 +23,7 @@ const PARALLEL_SQUARED: f64 = 1e-20;
 const MAX_PIECES: usize = 512;
 
 /// A surface and what is needed to find points on it.
-pub(super) struct Tracer<'a> {
+pub(super) struct EdgeTracer<'a> {
     surface: &'a Surface,
     /// Points over a grid of parameters, to start from.
     seeds: Vec<(Uv, Point)>,
@@ -33,12 +33,12 @@ pub(super) struct Tracer<'a> {
 }
 
 /// A uv curve and the largest distance found between its image and the edge, mm, by samples.
-pub(super) struct Traced {
+pub(super) struct TracedEdge {
     pub(super) uv: UvCurve,
     pub(super) gap: f64,
 }
 
-impl<'a> Tracer<'a> {
+impl<'a> EdgeTracer<'a> {
     /// Samples the surface over its domain, for searches to start from.
     pub(super) fn new(surface: &'a Surface) -> Self {
         let [[u0, u1], [v0, v1]] = surface.domain();
@@ -58,7 +58,7 @@ impl<'a> Tracer<'a> {
 
     /// Returns the uv curve of an edge, over the edge's own parameters; `near_u` tells two sides of a seam apart, `None` where there is
     /// none. Fails for edges more than [`ACCEPTED`] off the surface.
-    pub(super) fn trace(&self, edge: &Curve, near_u: Option<f64>) -> Result<Traced, String> {
+    pub(super) fn trace(&self, edge: &Curve, near_u: Option<f64>) -> Result<TracedEdge, String> {
         let [t0, t1] = edge.domain();
         // The kinks of the edge's parametrisation are always nodes.
         let mut pieces_each = 2;
@@ -75,7 +75,7 @@ impl<'a> Tracer<'a> {
             // When halving no longer helps, the file's own gap is what is left.
             if gap <= WANTED || 2 * ts.len() > MAX_PIECES {
                 return if gap <= ACCEPTED {
-                    Ok(Traced { uv, gap })
+                    Ok(TracedEdge { uv, gap })
                 } else {
                     Err(format!("an edge lies {gap:.3e} mm off the surface; at most {ACCEPTED:e} mm is accepted"))
                 };

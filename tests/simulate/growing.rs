@@ -31,7 +31,7 @@ fn part(rays: [u64; 2], shard: [u32; 2], from: Option<PartialRun>) -> PartialRun
 fn results(partial: PartialRun) -> Results {
     let (_, bound) = ball();
     let settings = RunSettings { rays: 20_000, grows: true, ..RunSettings::default() };
-    let traced = lampyris::simulate::Traced { partial, ..Default::default() };
+    let traced = lampyris::simulate::TracedRun { partial, ..Default::default() };
     Results::new(&bound, &settings, traced)
 }
 

@@ -128,7 +128,7 @@ fn parts_of_a_run_have_the_sequences_of_the_whole() {
     assert!(count > 20, "{count}");
     assert_eq!(whole.tallies.sequences, sum.tallies.sequences);
     let results = |partial: PartialRun| {
-        let traced = lampyris::simulate::Traced { partial, ..Default::default() };
+        let traced = lampyris::simulate::TracedRun { partial, ..Default::default() };
         Results::new(&bound, &RunSettings::from(&scene.run), traced).sequences
     };
     assert_eq!(results(whole), results(sum));
