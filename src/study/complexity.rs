@@ -17,16 +17,17 @@ use std::cell::Cell;
 use std::path::Path;
 use std::time::Instant;
 
-/// What is handed the prepared intersector and its number of facets (none for splines).
-pub type Use<'u> = dyn FnMut(&dyn Intersector, Option<usize>) + 'u;
+/// Called with the intersector that a method has prepared, and its number of facets; `None` on the spline.
+pub type OnPrepared<'u> = dyn FnMut(&dyn Intersector, Option<usize>) + 'u;
 
-/// A way to find hits: prepares itself for a model, then lets itself be used.
+/// A way to find hits that is timed.
 pub struct Method<'a> {
     /// `traditional`, `octree`, `bvh` or `exact`.
     pub name: &'static str,
-    /// Everything before the call of its argument is the time to prepare.
+    /// Prepares an intersector for a model and passes it to the callback, within whose call it lives. Its time, with a callback that does
+    /// nothing, is the time to prepare.
     #[expect(clippy::type_complexity, reason = "one callback in, one out")]
-    pub with: Box<dyn Fn(&Model, &mut Use<'_>) + 'a>,
+    pub prepare: Box<dyn Fn(&Model, &mut OnPrepared<'_>) + 'a>,
 }
 
 /// How many rays, and for how long.
@@ -123,7 +124,7 @@ pub fn complexity(
         let mut rounds = Rounds::default();
         // Times of preparing come from rounds of their own: while tracing all methods must live at once.
         for method in methods {
-            rounds.add(method.name, || (method.with)(&lamp.model, &mut |_, _| ()));
+            rounds.add(method.name, || (method.prepare)(&lamp.model, &mut |_, _| ()));
         }
         let prepare: Vec<Timing> = rounds.run(settings.rounds).into_iter().map(|t| t.1).collect();
         prepare_all(methods, &lamp.model, &[], &mut |ready| {
@@ -148,7 +149,7 @@ fn prepare_all(methods: &[Method<'_>], model: &Model, ready: &[Ready<'_>], then:
     // An intersector lives within the call that it is handed to: to have all at once, each is prepared inside of the
     // one before.
     let Some((first, rest)) = methods.split_first() else { return then(ready) };
-    (first.with)(model, &mut |intersector, facets| {
+    (first.prepare)(model, &mut |intersector, facets| {
         let mut more = ready.to_vec();
         more.push(Ready { name: first.name, intersector, facets });
         prepare_all(rest, model, &more, then);

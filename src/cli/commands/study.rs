@@ -305,7 +305,7 @@ fn study_complexity(
     let methods = [
         Method {
             name: "traditional",
-            with: Box::new(|model, then| {
+            prepare: Box::new(|model, then| {
                 // The traditional way stands on the spline's patches, and is charged with making them.
                 let exact = Exact::build(model, &Default::default());
                 then(&Traditional::new(model, &exact, Seeds::Sampled(4)), None);
@@ -313,21 +313,21 @@ fn study_complexity(
         },
         Method {
             name: "octree",
-            with: Box::new(|model, then| {
+            prepare: Box::new(|model, then| {
                 let made = tessellate(model, &mesh_settings);
                 then(&Octree::build(&made.mesh, &octree::Settings::default()), Some(made.mesh.facets.len()));
             }),
         },
         Method {
             name: "bvh",
-            with: Box::new(|model, then| {
+            prepare: Box::new(|model, then| {
                 let made = tessellate(model, &mesh_settings);
                 then(&Bvh::build(&made.mesh, &bvh::Settings::default()), Some(made.mesh.facets.len()));
             }),
         },
         Method {
             name: "exact",
-            with: Box::new(|model, then| then(&Exact::build(model, &Default::default()), None)),
+            prepare: Box::new(|model, then| then(&Exact::build(model, &Default::default()), None)),
         },
     ];
     let mut settings = complexity::Settings { seed, threads, ..Default::default() };
