@@ -57,7 +57,7 @@ pub struct Results {
     pub cut_off_rays: u64,
     /// Paths cut off because they went round by total reflection without end; counted in `cut_off_rays` too.
     pub caught_rays: u64,
-    /// Hits that used the facet's normal because the interpolated one would have sent the ray through the wrong side.
+    /// As [`Counts::corrected_normals`].
     pub corrected_normals: u64,
     /// Power absorbed by each instance on its faces, and in each medium.
     pub absorbed: Vec<Absorbed>,

@@ -61,7 +61,7 @@ impl Sequence {
 /// Where some light of a recorded path was counted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum DepositPlace {
-    /// On a plane, a sphere or in the far field.
+    /// On a plane, disc or sphere, or in the far field.
     Receiver(u32),
     /// In a face, which receivers of absorbed power may name.
     Face(u32),

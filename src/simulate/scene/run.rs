@@ -162,7 +162,7 @@ pub struct Accuracy {
     #[serde(deserialize_with = "lenient::range")]
     #[cfg_attr(feature = "schema", schemars(schema_with = "super::conditions::range_schema"))]
     pub tolerance_mm: Option<[f64; 2]>,
-    /// Largest angle between the normals of a facet's corners, degrees.
+    /// Largest angle between a facet and the surface normals at its corners, degrees; no limit unless given.
     pub angle_deg: Option<f64>,
     /// `octree`, `bvh2`, `cwbvh` or `exact`.
     pub intersector: Option<String>,
