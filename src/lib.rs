@@ -61,6 +61,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! The whole job of the command, from a scene file to figures with both their errors, is [`pipeline`].
+//!
 //! Lengths are millimetres, angles radians unless a name says otherwise (`angle_deg`), and every result is the same
 //! bits for any number of threads.
 
