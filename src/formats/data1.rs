@@ -1,4 +1,4 @@
-//! The light part of the seed's file format (Data_1): the number of rays, then for each ray its origin in mm, its direction
+//! The light part of the seed paper's file format (Data_1): the number of rays, then for each ray its origin in mm, its direction
 //! and its power, one ray a line, seven numbers separated by blanks.
 
 use super::input::read_text;

@@ -1,4 +1,4 @@
-//! The facet part of the seed's file format (Data_2): the number of facets, then for each facet its unit normal, its four
+//! The facet part of the seed paper's file format (Data_2): the number of facets, then for each facet its unit normal, its four
 //! corners in mm and the refractive-index ratio, one facet a line, sixteen numbers separated by blanks.
 
 use super::facets::{Facets, flat_normal};

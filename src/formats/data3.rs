@@ -1,4 +1,4 @@
-//! The result part of the seed's file format (Data_3): `Results[n][n]` and the rays that arrived.
+//! The result part of the seed paper's file format (Data_3): `Results[n][n]` and the rays that arrived.
 //!
 //! The first line holds the two sizes of the grid, rows first; then follows each row of `Results` on a line; then the number of
 //! rays and the rays as in Data_1: origin (the point of arrival), direction, power.

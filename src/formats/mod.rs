@@ -1,8 +1,8 @@
 //! Other people's file formats as plain structs, read and written; knows points and facets, nothing of simulation.
 //!
-//! Facets go out as Wavefront OBJ, Stanford PLY, STL, VTK's VTU, glTF 2.0 (GLB) and the seed's Data_2; grids as
-//! CSV, NPZ, PNG and VTI; polylines as VTP. Intensities are read and written as IES LM-63 and
-//! EULUMDAT, lists of rays as CSV and NPZ and the seed's Data_1, results as its Data_3.
+//! Facets go out as Wavefront OBJ, Stanford PLY, STL, VTK's VTU, glTF 2.0 (GLB) and Data_2; grids as CSV, NPZ, PNG and VTI; polylines
+//! as VTP. Intensities are read and written as IES LM-63 and EULUMDAT, lists of rays as CSV, NPZ and Data_1, results as Data_3; ray
+//! sets of measured sources and glass catalogues (AGF) are read. Data_1 to Data_3 are the files of the seed paper (Dong, Xue, Zhao).
 //!
 //! Guarantee: every file is written beside its final name and renamed when complete ([`write_atomic`]), so a reader
 //! never sees half of one; `f64` values survive CSV, NPZ, VTU, VTP, VTI, PLY and OBJ bit for bit (shortest text that reads back

@@ -1,6 +1,5 @@
-//! Verdicts of lamp regulations: each row of a table measured on a far field with the regulation's aim, where it is a scan
-//! for a cut-off, and sensor, and judged with both
-//! errors of the simulation.
+//! Verdicts of lamp regulations. Each row of a table is measured on a far field, with the regulation's sensor and, where it scans for a
+//! cut-off, its aim, and is judged with both errors of the simulation.
 //!
 //! A verdict is *pass* or *fail* only where the value is farther from its limit than three combined standard errors (statistical and
 //! geometric, added in quadrature), or as far as few rays or few replicates leave open at the same confidence; else it is *unsure*, and

@@ -1,4 +1,4 @@
-//! The seed paper's table 1: three lamps, the time before and after.
+//! Table 1 of the seed paper (Dong, Xue, Zhao): three lamps, the time before and after.
 //!
 //! *Before* is the traditional way, every ray against every spline surface; *after* is facets and tree with the time to make
 //! them. Beside them stands the certified spline. All trace the same light with the same random numbers, and the receivers

@@ -1,4 +1,4 @@
-//! The seed paper's table 2: how the normal between the corners is got, its error and its time.
+//! Table 2 of the seed paper (Dong, Xue, Zhao): how the normal between the corners is got, its error and its time.
 
 use super::hit_errors::HitErrors;
 use super::mesh_source::{FacetTree, MeasuredMesh, MeshSource, answer, with_intersectors};

@@ -2,9 +2,9 @@
 //! and lists of rays in NPZ and CSV.
 //!
 //! A measured set is recognised by its first bytes, never by its name, for `.ray` and `.dat` mean a dozen things; lists are told apart by
-//! their extension. Rays come in the unit of flux
-//! that the caller counts in where the file holds both. Where the header's total disagrees with the sum of the rays, as it does in files
-//! whose rays carry relative weights, the rays are scaled to the header's total and a note says so.
+//! their extension. Rays come in the unit of flux that the caller counts in where the file holds both. Where the header's total disagrees
+//! with the sum of the rays, as it does in files whose rays carry relative weights, the rays are scaled to the header's total and a note
+//! says so.
 //!
 //! Guarantee: a TM-25 file that is read and written again has the same bytes, unknown header values included, but for what a note names
 //! and what stands behind the end of a text.
