@@ -32,10 +32,10 @@ pub(crate) fn with_capacity<T>(count: usize) -> Vec<T> {
 #[cfg(feature = "cli")]
 pub(crate) fn prepare_heap() {
     const LARGEST_OF_HEAP: usize = 12 << 20;
-    const HALF: usize = 8 << 20;
+    const HALF_OF_KEPT: usize = 8 << 20;
     drop(std::hint::black_box(Vec::<u8>::with_capacity(LARGEST_OF_HEAP)));
     // Both at once, or the second would take the place of the first.
-    let halves: [Vec<u8>; 2] = [with_capacity(HALF), with_capacity(HALF)];
+    let halves: [Vec<u8>; 2] = [with_capacity(HALF_OF_KEPT), with_capacity(HALF_OF_KEPT)];
     drop(halves);
 }
 

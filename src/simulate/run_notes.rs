@@ -22,7 +22,7 @@ const UNLIKELY: f64 = 0.05;
 /// Draws of each ray of a list, were all of equal power, from which on its own scatter is more than theirs.
 const DRAWN_OFTEN: f64 = 2.0;
 /// Share of a list's light that arrives where what the list leaves open is greatest, for which it is told.
-const HALF: f64 = 0.5;
+const MOST_OPEN_SHARE: f64 = 0.5;
 /// Share of a list's rays below which it is told how many of equal power leave as little open.
 const UNEVEN: f64 = 0.9;
 /// Share of a source's power from which on what rounding changes of it is told.
@@ -168,7 +168,7 @@ impl BoundScene {
             String::new()
         };
         // What arrives of independent rays is binomial.
-        let open = HALF * (1.0 - HALF);
+        let open = MOST_OPEN_SHARE * (1.0 - MOST_OPEN_SHARE);
         Some(format!(
             "{} draws {} from a list of {}{as_good}{others}: printed errors are those of the draws; what the list itself leaves open, about \
              {} % of its light where half of it arrives, is in none of them",

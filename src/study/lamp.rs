@@ -20,7 +20,7 @@ pub struct Lamp {
 }
 
 /// Half the side of a cavity, mm.
-const HALF: f64 = 30.0;
+const HALF_SIDE: f64 = 30.0;
 /// Distance of neighbouring cavities, mm.
 const PITCH: f64 = 66.0;
 
@@ -56,12 +56,13 @@ fn lamp(name: &'static str, cavities: usize, spans: usize, ripple: f64) -> Lamp 
 /// Makes a paraboloid of focal length `focus`, mm, rippled by `ripple` mm, over a square about a centre, mm, as a spline of `spans`²
 /// bicubic patches: control points on the function at the Greville abscissae.
 fn cavity([x0, y0]: [f64; 2], focus: f64, spans: usize, ripple: f64) -> Surface {
-    let inner = (0..=spans).map(|i| -HALF + 2.0 * HALF * i as f64 / spans as f64);
-    let knots: Vec<f64> = std::iter::repeat_n(-HALF, 3).chain(inner).chain(std::iter::repeat_n(HALF, 3)).collect();
+    let inner = (0..=spans).map(|i| -HALF_SIDE + 2.0 * HALF_SIDE * i as f64 / spans as f64);
+    let knots: Vec<f64> =
+        std::iter::repeat_n(-HALF_SIDE, 3).chain(inner).chain(std::iter::repeat_n(HALF_SIDE, 3)).collect();
     let greville: Vec<f64> = knots[1..knots.len() - 1].windows(3).map(|w| (w[0] + w[1] + w[2]) / 3.0).collect();
     let height = |x: f64, y: f64| {
         // A span is a quarter of a wave: cubic splines follow it with ease.
-        let waves = std::f64::consts::PI * spans as f64 / (4.0 * HALF);
+        let waves = std::f64::consts::PI * spans as f64 / (4.0 * HALF_SIDE);
         (x * x + y * y) / (4.0 * focus) + ripple * (waves * x).cos() * (waves * y).cos()
     };
     let at = |x: f64, y: f64| Homogeneous::weighted(Point::new(x0 + x, y0 + y, height(x, y)), 1.0);

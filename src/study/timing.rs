@@ -33,6 +33,14 @@ pub struct Timing {
 }
 
 impl Timing {
+    /// Shortest time of a round that a rate is made of, s: below it a clock tells nothing.
+    pub const SHORTEST: f64 = 1e-12;
+
+    /// Returns million rays a second, of so many rays in these seconds, [`Self::SHORTEST`] at least.
+    pub fn mrays_per_s(rays: usize, seconds: f64) -> f64 {
+        rays as f64 / seconds.max(Self::SHORTEST) / 1e6
+    }
+
     /// Works out minimum, median and 90th percentile of the seconds of each run; all zero without any.
     pub fn from_seconds(mut seconds: Vec<f64>) -> Self {
         if seconds.is_empty() {

@@ -36,10 +36,6 @@ const TOLERANCES: [f64; 3] = [0.02, 0.0018, 0.000125];
 const RAYS: u64 = 50_000;
 const ROUNDS: usize = 11;
 
-/// Shortest time of a round that a rate is made of, s.
-const SHORTEST_ROUND: f64 = 1e-12;
-const MILLION: f64 = 1e6;
-
 /// Rows, the sentence that answers, and what the octrees look like.
 pub(crate) struct BvhBenchmark {
     pub(crate) rows: Vec<Value>,
@@ -277,7 +273,7 @@ fn timing_row(
 ) -> Value {
     let Question { model, mesh, kind, rays } = *question;
     let footprint = contender.intersector.footprint();
-    let rate = |seconds: f64| (rays.len() * threads) as f64 / seconds.max(SHORTEST_ROUND) / MILLION;
+    let rate = |seconds: f64| Timing::mrays_per_s(rays.len() * threads, seconds);
     let per_ray = |n: u64| n as f64 / rays.len().max(1) as f64;
     json!({
         "model": model, "facets": mesh.facets.len(), "intersector": contender.name, "build": contender.build,

@@ -10,6 +10,7 @@ use crate::math::Ray;
 use crate::mesh::FacetMesh;
 use crate::model::{Instancing, Model};
 use crate::pipeline::in_one_scene;
+use crate::study::Timing;
 use crate::study::cross_check::{CrossCheck, GroupedIntersectors, TimedIntersector, measure};
 use crate::tessellate::GroupedFacets;
 use std::borrow::Cow;
@@ -22,10 +23,6 @@ const ROUND_SECONDS: f64 = 0.1;
 const PROBED_RAYS: usize = 500;
 /// Timed rounds of every intersector, alternating.
 const TIMED_ROUNDS: usize = 3;
-/// Shortest time of a round that a rate is made of, s: below it a clock tells nothing.
-const SHORTEST_ROUND: f64 = 1e-12;
-/// Rays of a million rays per second.
-const MILLION: f64 = 1e6;
 
 /// The structures of all intersectors over the facets and the model of each group.
 pub(crate) struct Structures<'a> {
@@ -144,10 +141,10 @@ impl<'a> Structures<'a> {
         }
         let pace = measure(&intersectors, &evenly(rays, PROBED_RAYS), 1);
         let slowest = pace.iter().map(|(_, timing)| timing.median).fold(0.0, f64::max);
-        let enough = (ROUND_SECONDS / slowest.max(SHORTEST_ROUND) * PROBED_RAYS as f64) as usize;
+        let enough = (ROUND_SECONDS / slowest.max(Timing::SHORTEST) * PROBED_RAYS as f64) as usize;
         let timed = evenly(rays, enough.clamp(PROBED_RAYS, TIMED_RAYS));
         for (name, timing) in measure(&intersectors, &timed, TIMED_ROUNDS) {
-            found.mrays_per_s.set(&name, timed.len() as f64 / timing.median.max(SHORTEST_ROUND) / MILLION);
+            found.mrays_per_s.set(&name, Timing::mrays_per_s(timed.len(), timing.median));
         }
         spinner.finish_and_clear();
     }
