@@ -120,10 +120,10 @@ impl ErrorTarget {
         let mut rays = search.first_rays(FIRST_RAYS, most);
         loop {
             prepared.rays = Some(rays);
-            let (portion, results) = search.trace(prepared, monitor);
+            let (partial, results) = search.trace(prepared, monitor);
             let result = self.result(&results);
-            if result.missing_rays == 0 || !portion.is_whole() || rays >= most {
-                return (portion, result);
+            if result.missing_rays == 0 || !partial.is_whole() || rays >= most {
+                return (partial, result);
             }
             rays = next_rays(rays, self.growth(result.found_percent, results.replicates), most);
             monitor.grows(result.found_percent, rays);

@@ -64,8 +64,8 @@ impl GrowingSearch<'_> {
             let mut traced = None;
             self.keeper.keep(prepared, &mut |request| traced = Some(run(request)));
             let traced = traced.unwrap_or_else(|| run(TraceRequest::default()));
-            let portion = traced.partial.clone();
-            (portion, Results::new(&prepared.bound, &settings, traced))
+            let partial = traced.partial.clone();
+            (partial, Results::new(&prepared.bound, &settings, traced))
         })
     }
 }

@@ -24,11 +24,11 @@ pub fn trace_until_settled(
     let mut rays = search.first_rays(FIRST_RAYS, most);
     loop {
         prepared.rays = Some(rays);
-        let (portion, results) = search.trace(prepared, monitor);
+        let (partial, results) = search.trace(prepared, monitor);
         let wanted = rays_wanted(prepared, &results);
         // Settled, stopped or at the most: either way this is the run.
-        let Some(&most_wanted) = wanted.iter().max().filter(|_| portion.is_whole() && rays < most) else {
-            return (portion, rays);
+        let Some(&most_wanted) = wanted.iter().max().filter(|_| partial.is_whole() && rays < most) else {
+            return (partial, rays);
         };
         rays = next_rays(rays, growth_margin(results.replicates) * most_wanted as f64 / rays as f64, most);
         monitor.unsettled(wanted.len(), rays);

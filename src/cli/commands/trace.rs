@@ -198,10 +198,10 @@ fn trace_whole(
     let prepared = &*prepared;
     let checkpoint = Checkpoint::new(prepared, &place)?;
     let (traced, saved, result) = match found {
-        Some(SearchedRun { portion, .. }) if !portion.is_whole() => {
-            return Err(checkpoint.save_stopped(&portion, None, RESUME));
+        Some(SearchedRun { partial, .. }) if !partial.is_whole() => {
+            return Err(checkpoint.save_stopped(&partial, None, RESUME));
         }
-        Some(SearchedRun { portion, result }) => (Some(portion), None, result),
+        Some(SearchedRun { partial, result }) => (Some(partial), None, result),
         None if extra.resume => (None, checkpoint.read_and_say()?, None),
         None => (None, None, None),
     };
@@ -220,11 +220,11 @@ fn trace_whole(
     let monitor = TerminalMonitor::of_saveable(console, paths.as_ref());
     let mut run = match prepared.trace(request, &monitor) {
         Ok(run) => run,
-        Err(portion) => {
+        Err(partial) => {
             let failed = paths.and_then(PathFile::failure).map(|e| e.to_string());
             // Of rays that are traced already there are no paths to be had.
             let again = if extra.paths.is_some() { RESUME_WITHOUT_PATHS } else { RESUME };
-            return Err(checkpoint.save_stopped(&portion, failed.as_deref(), again));
+            return Err(checkpoint.save_stopped(&partial, failed.as_deref(), again));
         }
     };
     // The run counts whether its paths could be written or not.
@@ -345,10 +345,10 @@ fn trace_shard(
     let checkpoint = Checkpoint::new(prepared, &place)?;
     let from = checkpoint.read()?;
     // Asked again, a shard that is done is not traced once more: arrays of jobs are restarted as a whole.
-    if let Some(portion) = from.as_ref().filter(|p| shards::is_shard_done(p, replicates.clone(), shard)) {
+    if let Some(partial) = from.as_ref().filter(|p| shards::is_shard_done(p, replicates.clone(), shard)) {
         console.say("traced already: nothing is left to do");
-        shards::say_shard(&place.file, portion, shard, console)?;
-        return Ok(lost_rays::report_light_lost_in_part(portion, prepared, command.extra.max_lost, console));
+        shards::say_shard(&place.file, partial, shard, console)?;
+        return Ok(lost_rays::report_light_lost_in_part(partial, prepared, command.extra.max_lost, console));
     }
     if !command.extra.resume {
         refuse_overwriting(&place.file)?;
@@ -361,12 +361,12 @@ fn trace_shard(
         every: checkpoint.interval(),
         ..TraceRequest::default()
     };
-    let portion = prepared.trace_part(request, &TerminalMonitor::of_saveable(console, None));
+    let partial = prepared.trace_part(request, &TerminalMonitor::of_saveable(console, None));
     // Fewer replicates than the shard has: it was stopped.
-    if !shards::is_shard_done(&portion, replicates, shard) {
-        return Err(checkpoint.save_stopped(&portion, None, RESUME));
+    if !shards::is_shard_done(&partial, replicates, shard) {
+        return Err(checkpoint.save_stopped(&partial, None, RESUME));
     }
-    let file = checkpoint.save_anywhere(&portion)?;
+    let file = checkpoint.save_anywhere(&partial)?;
     // It was rescued to another place.
     if file != place.file {
         let message = format!("{}: cannot be written", place.file.display());
@@ -374,6 +374,6 @@ fn trace_shard(
             Failure::running(message).with_help(format!("nothing is lost: the shard is in {}", file.display()))
         );
     }
-    shards::say_shard(&place.file, &portion, shard, console)?;
-    Ok(lost_rays::report_light_lost_in_part(&portion, prepared, command.extra.max_lost, console))
+    shards::say_shard(&place.file, &partial, shard, console)?;
+    Ok(lost_rays::report_light_lost_in_part(&partial, prepared, command.extra.max_lost, console))
 }

@@ -38,7 +38,7 @@ impl Until<'_> {
 /// What was traced to find a number of rays.
 pub(super) struct SearchedRun {
     /// The last run.
-    pub(super) portion: PartialRun,
+    pub(super) partial: PartialRun,
     /// What came of an error that was to be reached.
     pub(super) result: Option<TargetResult>,
 }
@@ -61,7 +61,7 @@ impl RunKeeper for SavedRuns<'_> {
                 return trace(TraceRequest { from, ..TraceRequest::default() });
             }
         };
-        let save = |portion: &PartialRun| checkpoint.save_when_due(portion);
+        let save = |partial: &PartialRun| checkpoint.save_when_due(partial);
         trace(TraceRequest {
             from,
             finished: Some(&save),
@@ -99,12 +99,12 @@ pub(super) fn trace_until(
     let monitor = TerminalMonitor::of_saveable(place.console, None);
     Ok(match until {
         Until::Error(target) => {
-            let (portion, result) = target.trace(prepared, search, &monitor);
-            SearchedRun { portion, result: Some(result) }
+            let (partial, result) = target.trace(prepared, search, &monitor);
+            SearchedRun { partial, result: Some(result) }
         }
         Until::Settled => {
-            let (portion, _) = trace_until_settled(prepared, search, &monitor);
-            SearchedRun { portion, result: None }
+            let (partial, _) = trace_until_settled(prepared, search, &monitor);
+            SearchedRun { partial, result: None }
         }
     })
 }

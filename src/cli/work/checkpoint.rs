@@ -151,12 +151,12 @@ impl<'a> Checkpoint<'a> {
     }
 
     /// Saves the run if it is time to; a failure is said and the run goes on.
-    pub(crate) fn save_when_due(&self, portion: &PartialRun) {
+    pub(crate) fn save_when_due(&self, partial: &PartialRun) {
         let mut last = self.last.lock().unwrap_or_else(|e| e.into_inner());
         if last.elapsed() < self.place.every {
             return;
         }
-        if let Err(failure) = self.save(portion) {
+        if let Err(failure) = self.save(partial) {
             // A run that cannot be saved goes on all the same.
             self.place.console.say(format_args!("not saved: {failure}"));
         }
@@ -165,11 +165,11 @@ impl<'a> Checkpoint<'a> {
     }
 
     /// Saves the run now, in place of what was saved before; makes the folder.
-    pub(crate) fn save(&self, portion: &PartialRun) -> Result<(), Failure> {
+    pub(crate) fn save(&self, partial: &PartialRun) -> Result<(), Failure> {
         let file = &self.place.file;
         make_folder(&folder_of(file))?;
         let header = self.header_now();
-        Ok(write_atomic(file, |w| portion.write(&header, w))?)
+        Ok(write_atomic(file, |w| partial.write(&header, w))?)
     }
 
     /// Saves the sum of other parts, with what made these.
@@ -197,24 +197,24 @@ impl<'a> Checkpoint<'a> {
     ///
     /// # Errors
     /// When none of the places can be written.
-    pub(crate) fn save_anywhere(&self, portion: &PartialRun) -> Result<PathBuf, Failure> {
-        let reason = match self.save(portion) {
+    pub(crate) fn save_anywhere(&self, partial: &PartialRun) -> Result<PathBuf, Failure> {
+        let reason = match self.save(partial) {
             Ok(()) => return Ok(self.place.file.clone()),
             Err(failure) => failure,
         };
         let name = format!("lampyris-rescued-{}.tally", machine::process_name());
         let mut places = rescue_folders().into_iter().map(|folder| folder.join(&name));
         let header = self.header_now();
-        places.find(|file| write_atomic(file, |w| portion.write(&header, w)).is_ok()).ok_or(reason)
+        places.find(|file| write_atomic(file, |w| partial.write(&header, w)).is_ok()).ok_or(reason)
     }
 
     /// Saves a run that stopped before its end, interrupted or because something `failed`, and returns the failure that says so, and that
     /// `again` goes on from there.
-    pub(crate) fn save_stopped(&self, portion: &PartialRun, failed: Option<&str>, again: &str) -> Failure {
+    pub(crate) fn save_stopped(&self, partial: &PartialRun, failed: Option<&str>, again: &str) -> Failure {
         // A failure is a sentence of its own, with its own colons.
         let because = failed.map_or_else(|| "interrupted: ".to_owned(), |failure| format!("{failure}. "));
-        let share = format!("{} of {} replicates", portion.done.len(), portion.replicates);
-        match self.save_anywhere(portion) {
+        let share = format!("{} of {} replicates", partial.done.len(), partial.replicates);
+        match self.save_anywhere(partial) {
             Ok(file) if file == self.place.file => {
                 Failure::running(format!("{because}{share} are saved in {}", file.display()))
                     .with_help(format!("{again} goes on from there"))

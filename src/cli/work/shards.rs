@@ -112,8 +112,8 @@ fn launcher_shard(variable: &dyn Fn(&str) -> Option<String>, parts: Option<u32>)
 }
 
 /// Whether a part holds every replicate that its shard (index from 0, count) has of all replicates.
-pub(crate) fn is_shard_done(portion: &PartialRun, all: Range<u32>, shard: [u32; 2]) -> bool {
-    shard_replicates(all, shard).all(|r| portion.done.binary_search(&r).is_ok())
+pub(crate) fn is_shard_done(partial: &PartialRun, all: Range<u32>, shard: [u32; 2]) -> bool {
+    shard_replicates(all, shard).all(|r| partial.done.binary_search(&r).is_ok())
 }
 
 /// Returns where the tally of a shard (index from 0, count) goes: the file that was asked for, or one in the folder that was, named after
@@ -134,15 +134,15 @@ pub(crate) fn shard_file(output: &Path, [i, n]: [u32; 2], rays: Option<RayRange>
 /// Says, or with `--json` prints, what a finished shard (index from 0, count) holds.
 pub(crate) fn say_shard(
     file: &Path,
-    portion: &PartialRun,
+    partial: &PartialRun,
     [index, count]: [u32; 2],
     console: &Console,
 ) -> Result<(), Failure> {
-    let counts = &portion.tallies.counts;
+    let counts = &partial.tallies.counts;
     if console.json {
-        let document = json!({"shard": [index + 1, count], "replicates": portion.done.len(),
-            "of": portion.replicates, "rays": counts.rays, "segments": counts.segments, "lost_rays": counts.lost,
-            "seconds": {"trace": portion.seconds}, "file": file.display().to_string()});
+        let document = json!({"shard": [index + 1, count], "replicates": partial.done.len(),
+            "of": partial.replicates, "rays": counts.rays, "segments": counts.segments, "lost_rays": counts.lost,
+            "seconds": {"trace": partial.seconds}, "file": file.display().to_string()});
         return Ok(print(&json_text(&document)?)?);
     }
     let (rays, file) = (grouped(counts.rays), file.display());
