@@ -97,7 +97,7 @@ impl Drop for Unfinished {
     }
 }
 
-/// Removes what this process has begun to write and not finished, for a process that is about to end. Failures are passed over.
+/// Removes the files that this process has begun to write and not finished; for a process that is about to end. Failures are ignored.
 pub fn remove_unfinished_files() {
     for path in UNFINISHED.lock().unwrap_or_else(|e| e.into_inner()).drain(..) {
         let _ = fs::remove_file(path);
@@ -120,8 +120,8 @@ pub(super) fn unfinished(path: &Path) -> PathBuf {
     path.with_file_name(format!("{}{}-{serial}.part", unfinished_prefix(path), Writer::this()))
 }
 
-/// Removes what processes that are no more have left unfinished of this file, as [`write_atomic`] does. Of another machine's, and where the
-/// system does not tell which processes are, that is what has stood still for a day. Failures are passed over.
+/// Removes the unfinished files of this path that dead processes have left, as [`write_atomic`] does. Where the system does not tell
+/// whether a process lives, as of another machine, a file that was not written to for a day counts as left. Failures are ignored.
 pub fn remove_stale(path: &Path) {
     static LAST: Mutex<Option<PartListing>> = Mutex::new(None);
     let name = unfinished_prefix(path);

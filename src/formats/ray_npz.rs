@@ -10,7 +10,7 @@ use zip::read::{ZipArchive, ZipFile};
 
 /// Arrays of an NPZ file may unpack to this many times its size: directions, half of the numbers of a ray, hardly shrink.
 const MOST_INFLATION: u64 = 50;
-/// And to this much whatever its size, bytes: small files of equal rays shrink far.
+/// Bytes that they may unpack to whatever its size: small files of equal rays shrink far.
 const LEAST_BUDGET: u64 = 1 << 26;
 
 /// Bytes of an array that are unpacked at a time.

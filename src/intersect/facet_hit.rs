@@ -13,7 +13,7 @@ pub(crate) struct FacetHit {
     pub(crate) b: [f64; 3],
 }
 
-/// What no facet is called.
+/// Stands in place of a facet where there is none.
 const NO_FACET: u32 = u32::MAX;
 
 /// The nearest hit so far, with its edge functions.

@@ -42,18 +42,18 @@ pub trait Intersector: Sync {
         }
     }
 
-    /// Says which rays are going to be asked: what helps them all may be worked out now. No answer depends on it.
+    /// Announces rays that are to come, so that what helps them all can be prepared. No answer depends on it.
     fn prepare_for(&self, _expected: &ExpectedRays<'_>) {}
 
-    /// Whether it is known, without looking for a hit, that a ray of unit direction which leaves a surface, as its departure says, meets
-    /// nothing, however far it goes; `false` says nothing, and may become `true`. Adds nothing to a [`Cost`]; an intersector may note the
-    /// ray and work out what helps those after it.
+    /// Whether a ray that leaves a surface (its [`Ray::departure`] is set, its direction of unit length) is known to meet nothing at any
+    /// distance, without a search. `false` means that it is not known, and may become `true` later: an intersector may note the ray and
+    /// prepare what helps those after it. Adds nothing to a [`Cost`].
     fn escapes(&self, _ray: &Ray) -> bool {
         false
     }
 
-    /// As [`Self::escapes`] for rays between places of the spline: the ray leaves the piece of it that its facet stands for, and both this
-    /// and what it might meet lie up to `sag` mm off their facets. Only known where the same was announced ([`ExpectedRays::sag`]).
+    /// As [`Self::escapes`], for a ray that starts on the spline: its start, and the surfaces that it might meet, lie up to `sag` mm off
+    /// their facets. Known only where that sag was announced ([`ExpectedRays::sag`]).
     fn escapes_spline(&self, _ray: &Ray, _sag: f64) -> bool {
         false
     }
@@ -96,9 +96,9 @@ pub struct ExpectedRays<'a> {
     pub rays: u64,
     /// On how many threads.
     pub threads: usize,
-    /// Those of them that have a place or a direction in common, with their number.
+    /// Groups of them that share a starting point or a direction, each with its number of rays.
     pub beams: &'a [(Beam, u64)],
-    /// How far off their facets places that rays leave may lie, mm: 0 unless hits are moved to the spline.
+    /// How far off its facet a ray may start, mm: 0 unless hits are moved to the spline.
     pub sag: f64,
 }
 
@@ -172,7 +172,7 @@ pub struct Cost {
     pub tests: u64,
     /// Rays whose answer could not be certified or polished, and fell back.
     pub fallbacks: u64,
-    /// Rays whose hits were to be moved to the spline, and that it was asked about itself.
+    /// Rays that were put to the spline itself, as moving their facet hits to it was in doubt.
     pub doubtful: u64,
 }
 

@@ -35,8 +35,8 @@ const FACETING_SEGMENTS: f64 = 100_000.0;
 const FACETING_REPLICATES: u32 = 64;
 
 impl PreparedScene {
-    /// Traces the scene, asks some of its rays again of BVH and spline, and measures what facets change of its light. The request's shard
-    /// is not heeded; where it asks for kernels to be verified, nothing else of it is, nor the monitor.
+    /// Traces the scene, asks some of its rays again of BVH and spline, and measures what facets change of its light. Ignores the
+    /// request's shard; where it asks for kernels to be verified, ignores all else of it, and the monitor.
     ///
     /// # Errors
     /// What was traced, when that is not the whole run: the monitor ended it early, or a range of rays was asked for.

@@ -16,14 +16,14 @@ const GROWTH_RANGE: [f64; 2] = [2.0, 64.0];
 /// From so many replicates on a run is divided into those of one that grows, where its rays fill them.
 const LONG_RUN_REPLICATES: u64 = 128;
 
-/// Keeps a run while it is traced, so that what is done of it outlives its process.
+/// Saves a run while it is traced, so that what is done of it outlives its process.
 pub trait RunKeeper {
-    /// Calls `trace` once, for the run that `prepared` asks for, with a request that holds what is done of it already and what to call
-    /// with the rest as it is traced.
+    /// Calls `trace` once for the run that `prepared` describes, with a request that holds what is done of it already
+    /// ([`TraceRequest::from`]) and what to call as the rest is traced ([`TraceRequest::finished`]).
     fn keep(&self, prepared: &PreparedScene, trace: &mut dyn FnMut(TraceRequest<'_>));
 }
 
-/// Keeps nothing, and has nothing done.
+/// A keeper that saves nothing and starts every run anew.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Unkept;
 
@@ -33,12 +33,12 @@ impl RunKeeper for Unkept {
     }
 }
 
-/// A search for a number of rays.
+/// A search for the number of rays that an error or a verdict needs.
 #[derive(Clone, Copy)]
 pub struct GrowingSearch<'a> {
-    /// Rays of the first run, where an earlier search had come so far; `None` for those that a search begins with.
+    /// Rays of the first run, where it goes on from an earlier search; `None` for the number that a search begins with.
     pub resume_rays: Option<u64>,
-    /// Keeps its runs.
+    /// Saves its runs.
     pub keeper: &'a dyn RunKeeper,
 }
 

@@ -47,10 +47,10 @@ impl IntersectorChoice {
     }
 }
 
-/// Refuses normals of facets that are asked for beside the spline or above it: it has normals of its own.
+/// Refuses facet normals that are asked for, by the settings or by the scene, where the spline is traced, which has normals of its own.
 ///
 /// # Errors
-/// Then, and when the scene names an intersector or normals that are not known.
+/// When such normals are asked for, and when the scene names an intersector or normals that are not known.
 pub fn refuse_facet_normals(tracing: &TracingSettings, scene: Option<&Scene>) -> Result<(), Error> {
     let IntersectorChoice { intersector, normals } = IntersectorChoice::new(tracing, scene)?;
     // Settings that stand above the scene may leave its normals without meaning.

@@ -27,7 +27,7 @@ pub enum Stage<'a> {
     Checking(u64),
 }
 
-/// Hears how far a job is; nothing has to be heard.
+/// Receives the progress of a job. Every method does nothing unless it is overridden.
 pub trait Monitor: Sync {
     /// Told when a stage begins.
     fn begin(&self, _stage: Stage<'_>) {}
@@ -59,7 +59,7 @@ pub trait Monitor: Sync {
     fn grows(&self, _found_percent: Option<f64>, _rays: u64) {}
 }
 
-/// Hears nothing.
+/// A monitor that ignores everything.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Silent;
 

@@ -31,9 +31,9 @@ use std::time::Duration;
 /// Facets that are made before it is chosen how to trace: a second or two. Far more of them cost more than the spline does.
 const MOST_BEFORE_CHOICE: f64 = 1e5;
 
-/// Segments of a ray, by which true surfaces are made for a run: two to five in most scenes.
+/// Segments that the true surfaces of a run are built for, for each of its rays: most scenes have two to five.
 const SEGMENTS_A_RAY: u64 = 4;
-/// Segments of a pilot or a check, by which true surfaces are made for those.
+/// Segments that the true surfaces of a pilot or a check are built for.
 const FEW_SEGMENTS: u64 = 65_536;
 
 /// Ray paths kept for pictures.
@@ -48,7 +48,7 @@ pub struct PreparedScene {
     pub bound: BoundScene,
     /// The facets; parts that are placed often have them once.
     pub facets: GroupedFacets,
-    /// What they were made with.
+    /// The settings that the facets were made with.
     pub mesh_settings: tessellate::Settings,
     /// Seconds that the facets took.
     pub tessellation_seconds: f64,
@@ -56,9 +56,9 @@ pub struct PreparedScene {
     pub choice: IntersectorChoice,
     /// Threads that trace.
     pub threads: usize,
-    /// Rays to trace from the first on, in place of what the settings and the scene say: of a run that is to grow, or has grown.
+    /// Rays of the run, from the first on, in place of the number in the settings and the scene; set while a run grows.
     pub rays: Option<u64>,
-    /// Why it is traced as it is, where nobody asked for it.
+    /// How it is traced and why, where settings and scene left that open.
     pub chosen: Option<TracingChoice>,
     /// Built once for the run, where that asks the spline.
     surfaces: OnceLock<Vec<Arc<TrueSurface>>>,
@@ -66,18 +66,18 @@ pub struct PreparedScene {
     few_ray_surfaces: OnceLock<Vec<Arc<TrueSurface>>>,
 }
 
-/// How to trace beside the settings.
+/// What a caller asks of a trace besides its settings.
 #[derive(Clone, Default)]
 pub struct TraceRequest<'a> {
     /// Whether to trace with the full kernel too and compare.
     pub verify_pruning: bool,
-    /// What is done already, of the same run; it is not traced again.
+    /// The part of the same run that is done already; it is not traced again.
     pub from: Option<PartialRun>,
-    /// Which part of how many, from 0; all for `None`.
+    /// Which part, from 0, of how many [`PreparedScene::trace_part`] traces; the whole run for `None`.
     pub shard: Option<[u32; 2]>,
-    /// Told of all that is done, each thread after so long.
+    /// Called with all that is done so far, as [`Hooks::finished`].
     pub finished: Option<&'a (dyn Fn(&PartialRun) + Sync)>,
-    /// How long each thread keeps what it has done from `finished`.
+    /// How long each thread holds back what it has done from `finished`, as [`Hooks::every`].
     pub every: Duration,
     /// Takes every path.
     pub paths: Option<PathSink<'a>>,
@@ -324,7 +324,7 @@ impl PreparedScene {
         settings
     }
 
-    /// Returns the replicates that the run is to trace: all, or those from the first ray that was asked for on; shards are not heeded.
+    /// Returns the replicates that the run is to trace: all, or those from the first ray that was asked for on; shards are ignored.
     pub fn replicate_range(&self) -> Range<u32> {
         replicate_range(&self.bound, &self.run_settings())
     }
@@ -358,7 +358,7 @@ impl PreparedScene {
         })
     }
 
-    /// Traces on an intersector; ends early when the monitor asks for it. Of the request, `shard` and `verify_pruning` are not looked at.
+    /// Traces on an intersector; ends early when the monitor asks for it. Ignores `shard` and `verify_pruning` of the request.
     pub(super) fn run(
         &self,
         intersector: &dyn Intersector,

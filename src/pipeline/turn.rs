@@ -8,12 +8,12 @@ use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// How often it is looked whether the entry is made.
+/// Time between two looks for the entry.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
-/// After so long a process that makes an entry is taken to hang: those that wait make their own.
+/// Time after which a process that makes an entry is taken to hang, and those that wait make their own.
 const LONGEST_WAIT: Duration = Duration::from_secs(1800);
 
-/// The right to make an entry, while it lives; of nobody where nothing can be locked.
+/// The right to make an entry, held until it is dropped; without a lock where nothing can be locked.
 #[derive(Debug, Default)]
 pub(super) struct Turn(Option<(PathBuf, File)>);
 

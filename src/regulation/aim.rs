@@ -37,7 +37,7 @@ const LEVEL_HALF_DEG: f64 = 0.5;
 
 /// V of the horizontal scan, degrees (there, §2.3.2, a).
 const ELBOW_V_DEG: f64 = -0.2;
-/// It goes this far to both sides, degrees.
+/// The horizontal scan goes this far to both sides, degrees.
 const SCAN_H_DEG: f64 = 5.0;
 
 /// A shoulder that a level scan meets is as sharp across as the cut-off, and by so much flatter along the scan: at most by the inverse sine

@@ -9,7 +9,7 @@ const STEP_DEG: f64 = 0.05;
 
 /// Distance over which the gradient G = log₁₀ E(b) − log₁₀ E(b + 0.1°) is taken, degrees (§2.3.1).
 const GRADIENT_DEG: f64 = 0.1;
-/// The same in steps of the scan.
+/// [`GRADIENT_DEG`] in steps of the scan.
 const STEPS_OF_GRADIENT: usize = (GRADIENT_DEG / STEP_DEG).round() as usize;
 
 /// Half the opening that scans are made with, degrees: a detector of 30 mm at 25 m, however wide the cells are.
@@ -41,7 +41,7 @@ const SAME_PLACE_DEG: f64 = 2.0 * STEP_DEG;
 /// An edge is the border of a bright and a dark area: for half a degree light does not fall again on its one side, nor rise on its
 /// other, so that their means differ by no less than the light right beside it.
 const AREA_DEG: f64 = 0.5;
-/// The same in steps of the scan.
+/// [`AREA_DEG`] in steps of the scan.
 const STEPS_OF_AREA: usize = (AREA_DEG / STEP_DEG).round() as usize;
 
 /// The steepest place of a scan.

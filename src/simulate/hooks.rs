@@ -27,8 +27,8 @@ pub struct Hooks<'a> {
     pub progress: &'a (dyn Fn(Progress) -> bool + Sync),
     /// Called with all that is done so far, one call at a time.
     pub finished: Option<&'a (dyn Fn(&PartialRun) + Sync)>,
-    /// How long each thread keeps what it has done from `finished`; zero for a call after each replicate, which receivers with more than a
-    /// million cells get in any case.
+    /// How long each thread holds back what it has done from `finished`; zero for a call after each replicate, which runs with receivers of
+    /// more than a million cells get in any case.
     pub every: Duration,
     /// Called with the tally of each replicate when it is done, from any thread and in no particular order; each replicate comes once.
     pub replicate: Option<ReplicateHook<'a>>,

@@ -212,8 +212,8 @@ pub fn replay(bound: &BoundScene, intersector: &dyn Intersector, settings: &RunS
 /// Rays that are traced together where nothing of them is kept: their paths are a few megabytes.
 const ASKED_TOGETHER: u64 = 1024;
 
-/// Traces every `step`-th ray of a run once more, `count` of them from the first on, for what the intersector is asked of them in batches:
-/// the same as in [`replay`]. Nothing else is kept.
+/// Traces `count` rays of a run once more, every `step`-th from the first on, only to put their segments to the intersector, in batches.
+/// The segments are those of [`replay`]; no results are kept.
 pub fn ask_again(
     bound: &BoundScene,
     intersector: &dyn Intersector,
@@ -236,7 +236,7 @@ pub fn replicates(bound: &BoundScene, settings: &RunSettings) -> u32 {
     Plan::new(bound, settings).replicates
 }
 
-/// Returns the replicates of a run that its settings ask for: all of them, or those from its first ray on; shards are not heeded.
+/// Returns the replicates of a run that its settings ask for: all of them, or those from its first ray on; shards are ignored.
 pub fn replicate_range(bound: &BoundScene, settings: &RunSettings) -> Range<u32> {
     let plan = Plan::new(bound, settings);
     plan.first_replicate..plan.replicates

@@ -18,9 +18,9 @@ const SMALLEST: f64 = 1e-6;
 /// Time that truck may take for a whole shell. It does not come to an end on some poles: of the biconvex lens of the fixtures, at 0.05 mm,
 /// there was nothing after 100 s.
 const SHELL: Duration = Duration::from_secs(20);
-/// The same for one face alone.
+/// Time that truck may take for one face.
 const FACE: Duration = Duration::from_secs(2);
-/// The same for a model.
+/// Time that truck may take for a model.
 const MODEL: Duration = Duration::from_secs(60);
 
 /// Name of the threads that truck's mesher runs in: a panic there is a face without triangles and no more.

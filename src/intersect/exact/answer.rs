@@ -27,7 +27,7 @@ pub struct Passage {
     pub crossings: Vec<Hit>,
     /// The t, in order, of crossings with a trim within its band, and of those that such a trim turned away.
     pub near_trims: Vec<f64>,
-    /// The t from which on other crossings may be missing, for the budget ended or a place stayed undecided; infinite where all are found.
+    /// The t from which on crossings may be missing, as the budget ended or a place stayed undecided; infinite where all are found.
     pub undecided_from: f64,
 }
 
@@ -35,7 +35,7 @@ pub struct Passage {
 const BUDGET_OF_ALL: u32 = 4;
 /// Crossings of one face are one that lie within a contact of each other along the ray, and this share of their distance: 450 ulps.
 const SAME_CROSSING_FAR: f64 = 1e-13;
-/// And within so many ulps of the origin's largest coordinate: leaves far from the origin of the model are placed to some.
+/// Ulps of the origin's largest coordinate within which they are one too: leaves far from the origin of the model are placed to some.
 const SAME_CROSSING_PLACED: f64 = 64.0;
 /// A correction that moves a root farther is not one: where the search went by the net in the ray's frame, rounding may say
 /// otherwise, and its word stands.

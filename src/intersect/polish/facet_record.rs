@@ -9,7 +9,7 @@ use rustc_hash::FxHashMap;
 /// A ray whose sine to the facet that it leaves is above so many of the facet's bends is told by the facet's own normal: twice what a root
 /// may hide below.
 const CLEAR_BENDS: f64 = 2.0 * HIDDEN_BENDS;
-/// And it is above this: a hundred times what `f32` rounds.
+/// The least sine for which that holds: a hundred times what `f32` rounds.
 const LEAST_CLEAR_SINE: f64 = 1e-5;
 /// In [`FacetRecord::patch`]: its face has no surface that is traced.
 const NO_PATCH: u32 = u32::MAX;

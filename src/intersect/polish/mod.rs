@@ -36,7 +36,8 @@ use piece::Piece;
 use slabs::Slabs;
 use std::sync::{PoisonError, RwLock};
 
-/// And it is when it lies this near to it, mm, or by this share of its patch on smaller ones, beside [`OWN_ROUNDING`].
+/// A root within [`OWN_POINT`] is the point that the ray leaves where it lies this near to it, mm (on patches below a millimetre this share
+/// of their size), beside [`OWN_ROUNDING`].
 const SAME_POINT: f64 = 1e-7;
 /// Ulps of its largest coordinate that a ray's origin may be off.
 const OWN_ROUNDING: f64 = 64.0;

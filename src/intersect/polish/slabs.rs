@@ -21,7 +21,7 @@ const MOST_WITHOUT_MAP: usize = 2;
 const MOST_LISTED: usize = 12;
 /// Slabs that are looked at for the map of one facet; one with more around it, as a long strip across everything, always looks in the tree.
 const MOST_MAPPED: usize = 4096;
-/// And for all maps of a mesh: a tenth of a second. Of 56,000 facets that all lie across each other maps took 5 s.
+/// Slabs that are looked at for all maps of a mesh: a tenth of a second. Of 56,000 facets that all lie across each other maps took 5 s.
 const MOST_MAPPED_OF_MESH: usize = 1 << 22;
 /// Slabs that are looked at to find out whether a facet needs more than a list, those of its own face too.
 const MOST_LOOKED_AT: usize = 256;

@@ -13,7 +13,7 @@ pub(crate) enum RaySelection {
     Replicate(u32),
     /// One ray of the run.
     Ray(u64),
-    /// So many rays of the run from one on, so many numbers apart.
+    /// `count` rays of the run, every `step`-th from `first` on.
     Spread { first: u64, step: u64, count: u64 },
     /// One ray of the list of a source, whatever share of the power it has.
     Listed { source: u32, ray: u64 },
@@ -47,7 +47,7 @@ pub(super) struct Path<C> {
 
 /// A segment below this length, mm, lies in the edge between two facets, or crosses the gap between two faces that touch.
 const WITHIN_EDGE: f64 = 1e-6;
-/// So many such segments in a row are of light that is caught in an edge; a contact has one.
+/// Such segments in a row from which on light counts as caught in an edge; a contact has one.
 const CAUGHT_IN_EDGE: u32 = 3;
 
 /// No receiver ahead.
