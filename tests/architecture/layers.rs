@@ -750,7 +750,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "frames",
             "flush_receivers",
             "overlapping_receivers",
-            "chosen",
+            "face_rules",
             "rule_table",
             "materials",
             "notes",

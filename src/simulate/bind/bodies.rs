@@ -1,7 +1,7 @@
 //! The bodies of a model with the media that the rules give them.
 
 use super::bound_scene::BoundScene;
-use super::chosen::ChosenRules;
+use super::face_rules::FaceRules;
 use super::notes::belongs_to_open_shell;
 use crate::math::{Aabb, BoxTree};
 use crate::model::Model;
@@ -22,7 +22,7 @@ use std::collections::HashMap;
 pub(super) fn find_bodies(
     scene: &Scene,
     model: &Model,
-    chosen: &ChosenRules,
+    rules: &[FaceRules],
     light: &SceneLight,
     labels: &[String],
 ) -> Result<(Vec<Body>, Vec<u32>, bool), Error> {
@@ -32,8 +32,8 @@ pub(super) fn find_bodies(
     };
     let mut bodies = vec![Body::new(ambient, "surroundings".into(), light)];
     let mut places: HashMap<(usize, &str), usize> = HashMap::new();
-    let mut of_face = vec![AMBIENT; chosen.len()];
-    for (f, &(_, rule)) in model.placed_faces().zip(chosen) {
+    let mut of_face = vec![AMBIENT; rules.len()];
+    for (f, &FaceRules { medium: rule, .. }) in model.placed_faces().zip(rules) {
         // Faces without a medium belong to the surroundings.
         let Some((rule, name)) = rule.and_then(|r| Some((r, scene.materials[r].medium.as_deref()?))) else {
             continue;

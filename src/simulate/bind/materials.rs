@@ -1,6 +1,6 @@
 //! Surfaces from the rules of the scene.
 
-use super::chosen::ChosenRules;
+use super::face_rules::FaceRules;
 use crate::model::Model;
 use crate::optics::{Coating, Scatter};
 use crate::simulate::body::AMBIENT;
@@ -103,10 +103,10 @@ fn surface_index(surfaces: &mut Vec<Surface>, surface: Surface) -> Option<u16> {
 pub(super) fn check_interfaces(
     scene: &Scene,
     model: &Model,
-    chosen: &ChosenRules,
+    rules: &[FaceRules],
     bodies: &[u32],
 ) -> Result<(), Error> {
-    for ((f, (rule, _)), &body) in model.placed_faces().zip(chosen).zip(bodies) {
+    for ((f, FaceRules { surface: rule, .. }), &body) in model.placed_faces().zip(rules).zip(bodies) {
         let Some(i) = rule.filter(|&r| scene.materials[r].surface == Some(SurfaceOptics::Interface)) else {
             continue;
         };

@@ -4,8 +4,8 @@
 
 mod bodies;
 mod bound_scene;
-mod chosen;
 mod contacts;
+mod face_rules;
 mod face_selectors;
 mod flush_receivers;
 mod frames;
@@ -29,7 +29,7 @@ use super::{Error, ErrorKind};
 use crate::math::{Aabb, Frame, Vector};
 use crate::model::Model;
 pub use bound_scene::{BoundScene, RuleFaces};
-use chosen::ChosenRules;
+use face_rules::FaceRules;
 pub use face_selectors::face_selectors;
 pub use left_out::LeftOut;
 use luminous::LuminousSearch;
@@ -61,13 +61,13 @@ impl Scene {
         let ranges = source_light::source_ranges(self, &loaded);
         let file_notes = notes::source_file_notes(self, &loaded);
         // Bodies, from the rules that give media.
-        let chosen = chosen::choose_rules(self, model)?;
+        let rules = face_rules::find_rules(self, model)?;
         let labels = model.labels();
-        let (mut bodies, body_of_face, nested) = bodies::find_bodies(self, model, &chosen, &light, &labels)?;
-        materials::check_interfaces(self, model, &chosen, &body_of_face)?;
+        let (mut bodies, body_of_face, nested) = bodies::find_bodies(self, model, &rules, &light, &labels)?;
+        materials::check_interfaces(self, model, &rules, &body_of_face)?;
         source_light::check_indices(self, &loaded, &bodies)?;
         // Faces, from the rules that give surfaces and from what lies against what.
-        let Faces { faces, surfaces, touching_pairs } = bind_faces(self, model, &chosen, &body_of_face, nested)?;
+        let Faces { faces, surfaces, touching_pairs } = bind_faces(self, model, &rules, &body_of_face, nested)?;
         bodies::set_trapped_lengths(self, &mut bodies, &touching_pairs);
         let is_coated_contact = |f: &FaceOptics| {
             (f.touches_body || f.touches_sibling) && surfaces[f.surface as usize] != Surface::Interface
@@ -109,8 +109,8 @@ impl Scene {
             instances: labels,
             instance_of_face: model.placed_faces().map(|f| f.instance as u32).collect(),
             entity_of_face: model.placed_faces().map(|f| f.entity()).collect(),
-            rules: rule_table::rule_table(self, &chosen),
-            notes: notes::range_notes(self, &chosen, &ranges),
+            rules: rule_table::rule_table(self, &rules),
+            notes: notes::range_notes(self, &rules, &ranges),
         };
         bound.notes.extend(notes::invisible_light_note(self, &ranges));
         bound.notes.extend(notes::unused_media_note(self));
@@ -121,7 +121,7 @@ impl Scene {
         bound.notes.extend(notes::opening_note(&bound, model));
         bound.notes.extend(notes::filled_void_note(&bound, model));
         bound.notes.extend(notes::dark_far_field_note(&bound));
-        bound.notes.extend(notes::shut_body_note(&bound, &chosen));
+        bound.notes.extend(notes::shut_body_note(&bound, &rules));
         bound.notes.extend(notes::thin_body_note(&bound));
         bound.notes.extend(notes::ready_mesh_note(model));
         bound.notes.extend(flush_receivers::flush_receiver_notes(&bound, model));
@@ -146,20 +146,20 @@ struct Faces {
 fn bind_faces(
     scene: &Scene,
     model: &Model,
-    chosen: &ChosenRules,
+    rules: &[FaceRules],
     body_of_face: &[u32],
     nested: bool,
 ) -> Result<Faces, Error> {
     let (touching, touching_pairs) = if nested {
         contacts::touching_bodies(scene, model, body_of_face)
     } else {
-        (vec![false; chosen.len()], Vec::new())
+        (vec![false; rules.len()], Vec::new())
     };
     let siblings = contacts::touching_siblings(scene, model, body_of_face);
     let mut surfaces = SurfaceTable::new(scene);
-    let mut faces = Vec::with_capacity(chosen.len());
-    let mut opaque_outside = Vec::with_capacity(chosen.len());
-    for ((f, (rule, _)), &body) in model.placed_faces().zip(chosen).zip(body_of_face) {
+    let mut faces = Vec::with_capacity(rules.len());
+    let mut opaque_outside = Vec::with_capacity(rules.len());
+    for ((f, FaceRules { surface: rule, .. }), &body) in model.placed_faces().zip(rules).zip(body_of_face) {
         // A face with a medium and no surface is the bare boundary of that medium; one with neither has the scene's
         // default.
         let is_bare = rule.is_none() && body != AMBIENT;

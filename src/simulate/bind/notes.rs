@@ -2,7 +2,7 @@
 //! a formula was not made for.
 
 use super::bound_scene::{BoundScene, RuleFaces};
-use super::chosen::ChosenRules;
+use super::face_rules::FaceRules;
 use crate::model::{Model, PlacedFace};
 use crate::optics::{catalogue, observer_range};
 use crate::simulate::body::AMBIENT;
@@ -39,10 +39,10 @@ const FORMULA: &str = "the formula is used all the same there";
 
 /// Returns one sentence for each of the first tables and formulas in use that the light of a source goes beyond, and one that counts the
 /// others; `light` is first and last wavelength of each source, nm.
-pub(super) fn range_notes(scene: &Scene, chosen: &ChosenRules, light: &[[f64; 2]]) -> Vec<String> {
-    let media = chosen.iter().filter_map(|(_, rule)| scene.materials.get((*rule)?)?.medium.as_deref());
+pub(super) fn range_notes(scene: &Scene, rules: &[FaceRules], light: &[[f64; 2]]) -> Vec<String> {
+    let media = rules.iter().filter_map(|face| scene.materials.get(face.medium?)?.medium.as_deref());
     let media: BTreeSet<&str> = media.chain(scene.ambient.as_deref()).collect();
-    let surfaces: BTreeSet<usize> = chosen.iter().filter_map(|(rule, _)| *rule).collect();
+    let surfaces: BTreeSet<usize> = rules.iter().filter_map(|face| face.surface).collect();
     let mut known: Vec<KnownRange> = media.iter().flat_map(|name| medium_ranges(scene, name)).collect();
     for rule in surfaces {
         let Some(material) = scene.materials.get(rule) else { continue };
@@ -289,13 +289,15 @@ pub(super) fn dark_far_field_note(bound: &BoundScene) -> Option<String> {
 
 /// Returns one sentence about the first body none of whose faces lets light through, where the rule that gave it a surface stands above the
 /// one that gave it its medium: whoever wrote the medium last means it to be seen. `None` where there is no such body.
-pub(super) fn shut_body_note(bound: &BoundScene, chosen: &ChosenRules) -> Option<String> {
+pub(super) fn shut_body_note(bound: &BoundScene, rules: &[FaceRules]) -> Option<String> {
     let is_clear = |face: &FaceOptics| !bound.surfaces[usize::from(face.surface)].is_opaque();
     let clear: BTreeSet<u32> = bound.faces.iter().filter(|face| is_clear(face)).map(|face| face.body).collect();
     let shut =
-        bound.faces.iter().zip(chosen).filter(|(face, _)| face.body != AMBIENT && !clear.contains(&face.body));
+        bound.faces.iter().zip(rules).filter(|(face, _)| face.body != AMBIENT && !clear.contains(&face.body));
     let (body, surface, medium) = shut.into_iter().find_map(|(face, rules)| match *rules {
-        (Some(surface), Some(medium)) if surface < medium => Some((face.body, surface + 1, medium + 1)),
+        FaceRules { surface: Some(surface), medium: Some(medium) } if surface < medium => {
+            Some((face.body, surface + 1, medium + 1))
+        }
         _ => None,
     })?;
     let [name, substance] = bound.body_names(body)?;

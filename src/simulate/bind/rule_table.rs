@@ -1,12 +1,12 @@
 //! Which faces each rule of a scene decides, and which none does.
 
 use super::bound_scene::RuleFaces;
-use super::chosen::ChosenRules;
+use super::face_rules::FaceRules;
 use crate::simulate::scene::{Scene, SurfaceOptics};
 
 /// Returns one entry for each rule, in the order of the scene and with faces or without, and a last one for the faces that no rule names,
 /// if there are any. A face whose surface and medium come from two rules stands in both entries.
-pub(super) fn rule_table(scene: &Scene, chosen: &ChosenRules) -> Vec<RuleFaces> {
+pub(super) fn rule_table(scene: &Scene, face_rules: &[FaceRules]) -> Vec<RuleFaces> {
     let mut table: Vec<RuleFaces> = (scene.materials.iter().enumerate())
         .map(|(k, material)| {
             let medium = material.medium.as_ref().map(|m| format!("medium {m}"));
@@ -22,7 +22,7 @@ pub(super) fn rule_table(scene: &Scene, chosen: &ChosenRules) -> Vec<RuleFaces> 
         })
         .collect();
     let mut unnamed = Vec::new();
-    for (face, (surface, medium)) in chosen.iter().enumerate() {
+    for (face, FaceRules { surface, medium }) in face_rules.iter().enumerate() {
         let rules = [*surface, medium.filter(|m| Some(*m) != *surface)];
         // A rule that gives both surface and medium lists its face once.
         for rule in rules.into_iter().flatten() {

@@ -6,17 +6,22 @@ use crate::simulate::Error;
 use crate::simulate::scene::{Key, Scene};
 use std::collections::HashMap;
 
-/// For each placed face the indices in `scene.materials` of the last rule that gives its surface or scatter, and of the last that gives its
-/// medium; `None` where no rule does.
-pub(super) type ChosenRules = Vec<(Option<usize>, Option<usize>)>;
+/// The rules that decide a placed face, as indices in `scene.materials`; `None` where no rule does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct FaceRules {
+    /// The last rule that gives its surface or scatter.
+    pub(super) surface: Option<usize>,
+    /// The last rule that gives its medium.
+    pub(super) medium: Option<usize>,
+}
 
 /// Finds for each placed face the rules that give its surface and its medium; later rules stand above earlier ones. A medium given to a
 /// part of a solid's faces goes to all of them.
 ///
 /// # Errors
 /// When the selector of a rule means no face.
-pub(super) fn choose_rules(scene: &Scene, model: &Model) -> Result<ChosenRules, Error> {
-    let mut chosen: ChosenRules = vec![(None, None); model.placed_face_count()];
+pub(super) fn find_rules(scene: &Scene, model: &Model) -> Result<Vec<FaceRules>, Error> {
+    let mut rules = vec![FaceRules::default(); model.placed_face_count()];
     let mut search = FaceSearch::new(model);
     for (i, rule) in scene.materials.iter().enumerate() {
         let base = [Key::Name("material"), Key::Index(i), Key::Name("on")];
@@ -24,24 +29,24 @@ pub(super) fn choose_rules(scene: &Scene, model: &Model) -> Result<ChosenRules, 
         for face in select_faces(scene, base, &rule.faces(), &mut search)? {
             // A later rule stands above an earlier one, for surfaces and media apart.
             if rule.surface.is_some() || rule.scatter.is_some() {
-                chosen[face].0 = Some(i);
+                rules[face].surface = Some(i);
             }
             if rule.medium.is_some() {
-                chosen[face].1 = Some(i);
+                rules[face].medium = Some(i);
             }
         }
     }
-    spread_media_over_solids(scene, model, &mut chosen);
-    Ok(chosen)
+    spread_media_over_solids(scene, model, &mut rules);
+    Ok(rules)
 }
 
-/// Gives the faces without a medium the rule of the other faces of their solid, in `chosen`; not where those name two media, and not to
-/// faces of no shell.
-fn spread_media_over_solids(scene: &Scene, model: &Model, chosen: &mut ChosenRules) {
+/// Gives the faces without a medium the rule of the other faces of their solid; not where those name two media, and not to faces of no
+/// shell.
+fn spread_media_over_solids(scene: &Scene, model: &Model, rules: &mut [FaceRules]) {
     let medium = |rule: Option<usize>| rule.and_then(|r| scene.materials[r].medium.as_deref());
     let mut solids: HashMap<(usize, usize), Option<usize>> = HashMap::new();
     let key = |f: &PlacedFace<'_>| Some((f.instance, f.shell?));
-    for (f, (_, rule)) in model.placed_faces().zip(chosen.iter()) {
+    for (f, FaceRules { medium: rule, .. }) in model.placed_faces().zip(rules.iter()) {
         let (Some(key), Some(rule)) = (key(&f), *rule) else { continue };
         let one = solids.entry(key).or_insert(Some(rule));
         // Two media on one solid: which of its other faces has which is not for us to guess.
@@ -49,7 +54,7 @@ fn spread_media_over_solids(scene: &Scene, model: &Model, chosen: &mut ChosenRul
             *one = None;
         }
     }
-    for (f, (_, rule)) in model.placed_faces().zip(chosen.iter_mut()) {
+    for (f, FaceRules { medium: rule, .. }) in model.placed_faces().zip(rules.iter_mut()) {
         if let (Some(key), None) = (key(&f), *rule) {
             *rule = solids.get(&key).copied().flatten();
         }
