@@ -29,6 +29,17 @@ pub fn is_accuracy_asked(meshing: &MeshingSettings, tracing: &TracingSettings, s
     in_scene || facets || tracing.normals.is_some() || tracing.intersector.is_some()
 }
 
+/// A run that is to be given tolerance, normals and intersector, and the facets that are made for it already.
+#[derive(Clone, Copy)]
+pub(super) struct OpenRun<'a> {
+    pub(super) model: &'a Model,
+    pub(super) bound: &'a BoundScene,
+    pub(super) run: &'a RunSettings,
+    pub(super) facets: &'a GroupedFacets,
+    /// What these facets were made with.
+    pub(super) mesher: &'a tessellate::Settings,
+}
+
 /// Makes what a pilot compares, for a model in one piece or in groups.
 struct Source<'a> {
     model: &'a Model,
@@ -70,15 +81,14 @@ impl PilotSource for Source<'_> {
     }
 }
 
-/// Chooses facets or spline for a run whose facets of the default tolerance are made; returns finer facets too, where these are chosen.
-/// `surfaces` builds the true surface of each group, and is asked only where a pilot is traced.
+/// Chooses facets or spline for a run; returns finer facets than it has too, where these are chosen. `surfaces` builds the true surface of
+/// each group, and is asked only where a pilot is traced.
 pub(super) fn choose<'a>(
-    (model, surfaces): (&'a Model, &'a dyn Fn() -> &'a [Arc<TrueSurface>]),
-    bound: &'a BoundScene,
-    run: &'a RunSettings,
-    (facets, mesher): (&'a GroupedFacets, &'a tessellate::Settings),
+    open: OpenRun<'a>,
+    surfaces: &'a dyn Fn() -> &'a [Arc<TrueSurface>],
     monitor: &dyn Monitor,
 ) -> (TracingChoice, Option<TimedFacets>) {
+    let OpenRun { model, bound, run, facets, mesher } = open;
     let instancing = facets.instancing.as_deref();
     let models = instancing.map_or(slice::from_ref(model), |i| &i.groups);
     let source = Source { model, made: facets, mesher, surfaces, exact: OnceCell::new() };
@@ -89,12 +99,8 @@ pub(super) fn choose<'a>(
 }
 
 /// Whether a pilot is needed to choose: not for flat faces and short runs.
-pub(super) fn needs_pilot(
-    model: &Model,
-    bound: &BoundScene,
-    run: &RunSettings,
-    (facets, mesher): (&GroupedFacets, &tessellate::Settings),
-) -> bool {
+pub(super) fn needs_pilot(open: OpenRun<'_>) -> bool {
+    let OpenRun { model, bound, run, facets, mesher } = open;
     let models = facets.instancing.as_deref().map_or(slice::from_ref(model), |i| &i.groups);
     let source = Source { model, made: facets, mesher, surfaces: &|| &[], exact: OnceCell::new() };
     let tolerance = mesher.tolerance;

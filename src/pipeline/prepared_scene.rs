@@ -1,7 +1,7 @@
 //! A scene that is bound and faceted, and the tracing of it.
 
 use super::cache::{CachedFacets, group_keys};
-use super::default_accuracy::{self, is_accuracy_asked};
+use super::default_accuracy::{self, OpenRun, is_accuracy_asked};
 use super::error::Error;
 use super::expected_facets::expected_facets;
 use super::facets::mesh_settings;
@@ -157,9 +157,8 @@ impl PreparedScene {
         let excess = self.coarsen_to_limit(instancing.map(Arc::as_ref));
         self.make_facets(instancing, monitor);
         let run = RunSettings { sequences: false, ..self.run_settings() };
-        let facets = (&self.facets, &self.mesh_settings);
         // Without a pilot to choose is cheaper than to wait.
-        let needs_pilot = default_accuracy::needs_pilot(&self.job.loaded.model, &self.bound, &run, facets);
+        let needs_pilot = default_accuracy::needs_pilot(self.open_run(&run));
         let cached = self.job.cache.clone().zip(undecided).filter(|_| needs_pilot);
         let turn = match cached.as_ref().map(|(cache, undecided)| cache.choice_or_turn(undecided, monitor)) {
             Some(Ok(chosen)) => {
@@ -234,9 +233,7 @@ impl PreparedScene {
     /// the number of facets that the default tolerance would make, where those were too many to be tried.
     fn choose_accuracy(&mut self, run: RunSettings, excess: Option<f64>, monitor: &dyn Monitor) -> TracingChoice {
         let surfaces = || self.surfaces_for_few_rays();
-        let facets = (&self.facets, &self.mesh_settings);
-        let model = (&self.job.loaded.model, &surfaces as &dyn Fn() -> _);
-        let (mut chosen, finer) = default_accuracy::choose(model, &self.bound, &run, facets, monitor);
+        let (mut chosen, finer) = default_accuracy::choose(self.open_run(&run), &surfaces, monitor);
         if let Some(expected) = excess {
             let [finest, loosest] = tessellate::Settings::default().range();
             chosen.because += &format!(
@@ -248,6 +245,17 @@ impl PreparedScene {
             self.tessellation_seconds += finer.seconds;
         }
         chosen
+    }
+
+    /// Returns what a choice of how to trace is made from.
+    fn open_run<'a>(&'a self, run: &'a RunSettings) -> OpenRun<'a> {
+        OpenRun {
+            model: &self.job.loaded.model,
+            bound: &self.bound,
+            run,
+            facets: &self.facets,
+            mesher: &self.mesh_settings,
+        }
     }
 
     /// Returns the models of the groups; of a scene in one piece the whole one.
