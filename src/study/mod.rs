@@ -17,6 +17,7 @@ mod counted_work;
 pub mod cross_check;
 pub mod default_accuracy;
 pub mod effects;
+mod facet_errors;
 pub mod figures;
 pub mod geometric_error;
 mod hit_errors;
@@ -41,6 +42,7 @@ mod tolerance_plan;
 mod tracing_way;
 mod worst_figure;
 
+pub use facet_errors::facet_errors;
 #[cfg(feature = "report")]
 pub(crate) use hit_errors::slope;
 pub use lift::Lift;

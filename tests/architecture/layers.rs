@@ -560,6 +560,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "random",
             "timing",
             "records",
+            "facet_errors",
             "arbiter",
             "lift",
             "rays",

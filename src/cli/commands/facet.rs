@@ -10,11 +10,11 @@ use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::{input_files, threads};
 use crate::cli::{completion::Completion, failure::Failure};
 use crate::formats::{ErrorKind, FACET_EXTENSIONS, is_facet_file, lower_extension, write_facets};
-use crate::mesh::FacetMesh;
-use crate::model::{Model, PlacedFace};
+use crate::model::Model;
 use crate::pipeline::{mesh_settings, settings_for_accurate_facets, tessellate_model};
 use crate::report::{bytes, seconds, tolerance_text};
 use crate::step::peak_bytes;
+use crate::study::facet_errors;
 use crate::tessellate::{Report, sampled_sag};
 use crate::text::{count_of, figures, grouped};
 use crate::truck::baseline;
@@ -58,7 +58,7 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
     let mut facets = appearance::grouped_facets(&loaded.model, &made.mesh, None);
     // Only VTU has a place for them, and they cost a look at every facet.
     if command.output.iter().any(|path| lower_extension(path) == "vtu") {
-        (facets.normal_error_deg, facets.curvature_per_mm) = normal_errors(&loaded.model, &made.mesh);
+        (facets.normal_error_deg, facets.curvature_per_mm) = facet_errors(&loaded.model, &made.mesh);
     }
     for path in &command.output {
         let spinner = console.spinner(&format!("writing {}", path.display()));
@@ -239,56 +239,4 @@ fn meshing_summary(r: &Report) -> String {
     let peak = r.peak_bytes.map_or(String::new(), |b| format!("; {} at most", bytes(b)));
     line("time", format!("read {}, tessellate {}{peak}", seconds(r.seconds.read), seconds(r.seconds.tessellate)));
     text
-}
-
-/// Returns, for each facet, the largest angle between interpolated and true normal at its middle and the middles of its sides, degrees, and
-/// the largest curvature there, 1/mm; NaN for facets of ready meshes.
-pub(crate) fn normal_errors(model: &Model, mesh: &FacetMesh) -> (Vec<f64>, Vec<f64>) {
-    use rayon::prelude::*;
-    let faces: Vec<PlacedFace> = model.placed_faces().collect();
-    (0..mesh.facets.len())
-        .into_par_iter()
-        .map(|i| {
-            let facet = &mesh.facets[i];
-            let Some((placed, face)) = faces.get(facet.face.index()).and_then(|p| p.face.map(|face| (p, face)))
-            else {
-                // A ready mesh has no surface to err from.
-                return (f64::NAN, f64::NAN);
-            };
-            let corners = facet.vertices.map(|v| mesh.vertices[v as usize]);
-            let sides = if facet.is_triangle() { 3 } else { 4 };
-            let mut places: Vec<Vec<usize>> = (0..sides).map(|k| vec![k, (k + 1) % sides]).collect();
-            places.push((0..sides).collect());
-            let (mut worst, mut curved) = (0f64, 0f64);
-            for place in places {
-                let share = 1.0 / place.len() as f64;
-                let uv = place.iter().map(|&k| corners[k].uv * share).sum();
-                let mixed: crate::math::Vector = place.iter().map(|&k| corners[k].normal).sum();
-                let d = face.surface.second_derivatives(face.surface.clamp(uv));
-                // At a pole there is no normal to compare.
-                let Some(n) = d.du.cross(d.dv).try_normalize() else { continue };
-                let true_normal = placed.placement.normal(if face.reversed { -n } else { n });
-                let angle = mixed.cross(true_normal).length().atan2(mixed.dot(true_normal)).to_degrees();
-                worst = worst.max(angle);
-                curved = curved.max(largest_curvature(&d, n) / placed.placement.scale);
-            }
-            (worst, curved)
-        })
-        .unzip()
-}
-
-/// Returns the largest absolute principal curvature, in the surface's own lengths, at derivatives `d` with unit normal `n`; NaN where they
-/// span no plane.
-fn largest_curvature(d: &crate::nurbs::SecondDerivatives, n: crate::math::Vector) -> f64 {
-    // From the first and second fundamental form: E, F, G and L, M, N.
-    let (e, f, g) = (d.du.dot(d.du), d.du.dot(d.dv), d.dv.dot(d.dv));
-    let (l, m, k) = (d.duu.dot(n), d.duv.dot(n), d.dvv.dot(n));
-    let det = e * g - f * f;
-    if det <= 0.0 {
-        return f64::NAN;
-    }
-    let mean = (e * k - 2.0 * f * m + g * l) / (2.0 * det);
-    let gauss = (l * k - m * m) / det;
-    // The larger of both principal curvatures is |H| + √(H² − K).
-    mean.abs() + (mean * mean - gauss).max(0.0).sqrt()
 }

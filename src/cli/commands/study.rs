@@ -256,7 +256,7 @@ fn error_view(command: &StudyCommand, console: &Console) -> Result<Section, Fail
     let (scene, loaded, _) = read_model(command.file, console)?;
     let settings = mesh_settings(&command.meshing, scene.as_ref(), &loaded.model)?;
     let (made, _) = tessellate_model(&loaded.model, &settings, &TerminalMonitor::new(console));
-    let (errors, _) = super::facet::normal_errors(&loaded.model, &made.mesh);
+    let (errors, _) = study::facet_errors(&loaded.model, &made.mesh);
     let bound = scene.as_ref().map(|s| s.bind(&loaded.model)).transpose()?;
     let facets = crate::cli::output::appearance::grouped_facets(&loaded.model, &made.mesh, bound.as_ref());
     let text = format!(
