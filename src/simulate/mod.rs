@@ -37,6 +37,7 @@ mod listed_rays;
 mod lost_light;
 mod outcome;
 mod partial_run;
+mod partial_run_file;
 mod path_sample;
 mod plan;
 mod pole_rings;

@@ -722,6 +722,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "listed_rays",
             "fingerprint",
             "partial_run",
+            "partial_run_file",
             "power_scale",
             "hooks",
             "gather",
