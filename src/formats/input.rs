@@ -1,4 +1,4 @@
-//! Files from elsewhere: what is no ordinary file is refused before it is opened, for a pipe or a device may have no end.
+//! Files from elsewhere: what is no ordinary file is refused before it is opened, because a pipe or a device may have no end.
 
 use std::fs::{self, File};
 use std::io::{self, Read};

@@ -11,7 +11,7 @@
 //! 5. a tree too deep for the fixed stack of CwBvh is walked as the binary tree;
 //! 6. rays start where they enter the mesh, so that f32 origins are good from any distance, and a little earlier,
 //!    for the node test of CwBvh discards what ends before t = 1e-4;
-//! 7. the mesh is scaled by a power of two to a size of about a hundred, for such absolute limits let rays pass through a mesh
+//! 7. the mesh is scaled by a power of two to a size of about a hundred, because such absolute limits let rays pass through a mesh
 //!    of 1e-4 mm.
 //!
 //! Boxes that are many times the same are one primitive (`bvh_tree`), cured or not: obvhs would not end over ten thousands of them.

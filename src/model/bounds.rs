@@ -236,7 +236,7 @@ fn highest(height: impl Fn(f64) -> f64, [mut from, mut to]: [f64; 2]) -> f64 {
 fn climb(start: Uv, cell: Uv, height: impl Fn(Uv) -> f64, outline: &Outline) -> Uv {
     let mut uv = start;
     let mut best = height(uv);
-    // Half a cell, for the summit lies between the samples beside the best one.
+    // Half a cell, because the summit lies between the samples beside the best one.
     let mut stride = 0.5 * cell;
     for _ in 0..ROUNDS {
         let mut moved = false;

@@ -75,7 +75,8 @@ pub(super) fn most_rays(prepared: &PreparedScene) -> u64 {
     prepared.job.tracing.rays().unwrap_or(MOST_RAYS)
 }
 
-/// Returns how many times as many rays to trace as an error asks for that was found from so many replicates, for it has an error itself.
+/// Returns the factor by which to exceed the number of rays that an error asks for: an error found from so many replicates has an error
+/// itself.
 ///
 /// The square of a standard error, with which the rays go, is spread by √(2 / (n − 1)) of itself when it is found from n replicates. The
 /// run that is asked for finds its error in the same way, from as many replicates at least: the spread of the ratio of both is at most √2

@@ -307,7 +307,7 @@ impl PreparedScene {
         groups.map(surface).collect()
     }
 
-    /// Returns how many placed faces of a run on facets have none, and how many there are; on the spline none counts, for it needs no
+    /// Returns how many placed faces of a run on facets have none, and how many there are; on the spline none counts, because it needs no
     /// facets.
     pub fn bare_faces(&self) -> [usize; 2] {
         let model = &self.job.loaded.model;

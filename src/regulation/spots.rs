@@ -16,7 +16,7 @@ struct Place {
 /// Returns the sightings without those that belong to spots: of every connected group of directions that may be brighter than `greatest`,
 /// cd, the brightest are let pass, up to the solid angle of a disc of this radius, degrees.
 ///
-/// What is left of a group is compared with the limit like any other direction: surely brighter, it fails, for the group is then larger
+/// What is left of a group is compared with the limit like any other direction: surely brighter, it fails, because the group is then larger
 /// than a spot may be. The sightings are those of a grid half an opening apart.
 pub(super) fn outside_spots(
     photometer: &Photometer,

@@ -120,7 +120,7 @@ fn realign(
         let photometer = Photometer { aim: &aim, turns: count, ..*photometer };
         let mended =
             |row: &&Row| judge_row(&photometer, regulation, assumptions, row).verdict != Some(Verdict::Fail);
-        // Then all of them, for a turn that mends one row may break another.
+        // Then all of them, because a turn that mends one row may break another.
         if !failed.iter().all(mended) {
             return None;
         }

@@ -16,7 +16,7 @@ const PAGE_SCRIPT: &str = include_str!("page.js");
 /// Gives the picture of a view as the bytes of a PNG file, or why it could not be drawn.
 pub(super) type PngOf<'a> = &'a dyn Fn(&View) -> Result<Vec<u8>, String>;
 
-/// Stands for the scripts until the rest of the page is made; no text of a report can hold it, for its marks are escaped there.
+/// Stands for the scripts until the rest of the page is made; no text of a report can hold it, because its marks are escaped there.
 const SCRIPTS_GO_HERE: &str = "<!--scripts-->";
 
 /// Writes what the browser is told: nothing may be loaded from anywhere, and no script may run but these, which it knows by their hash

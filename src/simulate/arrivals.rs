@@ -121,7 +121,7 @@ fn counted_range(ray: &Ray, a: &PathVertex, b: &PathVertex, absorbs: bool) -> [f
     let length = (b.point - a.point).length();
     let end = match b.event {
         Event::Escaped => f64::INFINITY,
-        // Twice, for the way back is rounded too.
+        // Twice, because the way back is rounded too.
         Event::Received => length + 2.0 * in_front(ray, length),
         _ => length + in_front(ray, length),
     };

@@ -3,7 +3,7 @@
 //! *Before* is the traditional way, every ray against every spline surface; *after* is facets and tree with the time to make
 //! them. Beside them stands the certified spline. All trace the same light with the same random numbers, and the receivers
 //! must agree. Preparing and tracing are both timed in alternating rounds; the traditional method is charged its own preparing
-//! too. It is given fewer rays, for its time is in proportion to them.
+//! too. It is given fewer rays, because its time is in proportion to them.
 
 use super::lamp::{Lamp, lamps};
 use super::timing::Clock;

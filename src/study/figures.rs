@@ -136,7 +136,7 @@ pub fn cell_errors(r: &ReceiverResult) -> Vec<f64> {
 }
 
 /// Returns the error of cells relative to their light, both weighted by that light: Σ cσ / Σ c² over the cells with light. `None` without
-/// light. Dark cells add nothing, for their error is what one ray would bring, and of many such it would be all there is.
+/// light. Dark cells add nothing, because their error is what one ray would bring, and of many such it would be all there is.
 pub fn light_weighted_error(cells: &[f64], errors: &[f64]) -> Option<f64> {
     let lit = || cells.iter().zip(errors).filter(|(light, _)| **light > 0.0);
     let weight: f64 = lit().map(|(light, _)| light * light).sum();

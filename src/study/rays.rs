@@ -170,7 +170,7 @@ impl RaySource for Bounces<'_> {
         self.first.count
     }
     fn rays(&self, range: Range<u64>) -> Vec<Ray> {
-        // Whole paths are made, for a ray follows from those before it; what was not asked for is dropped.
+        // Whole paths are made, because a ray follows from those before it; what was not asked for is dropped.
         let mut rays = Vec::with_capacity((range.end - range.start) as usize);
         let mut path = range.start / RAYS_PER_PATH;
         while path * RAYS_PER_PATH < range.end {

@@ -121,7 +121,7 @@ pub(super) fn receivers(
     for of_one in combinations.chunk_by(|a, b| a.tolerance == b.tolerance) {
         let tolerance = of_one[0].tolerance;
         // What was expected, corrected by how long the combinations so far took against it; a quarter of the whole counts as done just
-        // as expected, for the first few alone led to forecasts a third too long.
+        // as expected, because the first few alone led to forecasts a third too long.
         let kept = 0.25 * seconds(combinations);
         let spent = if done == 0 { 0.0 } else { start.elapsed().as_secs_f64() };
         let pace = (spent + kept) / (seconds(&combinations[..done]) + kept).max(LEAST_SECONDS);

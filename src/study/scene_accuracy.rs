@@ -80,7 +80,7 @@ impl Pilot {
             simulate(bound, intersector, &few, &|_| true);
             start.elapsed().as_secs_f64()
         };
-        // Two numbers of rays, for a run costs something before its first: a tenth of the rays alone gave a third too much. The first
+        // Two numbers of rays, because a run costs something before its first: a tenth of the rays alone gave a third too much. The first
         // run also warms threads and caches.
         let (few, more) = (run.rays.div_ceil(20), run.rays.div_ceil(4));
         let seconds = |intersector: &dyn Intersector| {

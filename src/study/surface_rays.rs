@@ -15,7 +15,7 @@ pub const PATH: u64 = 4;
 pub struct SurfacePaths<'a> {
     mesh: &'a FacetMesh,
     guide: &'a dyn Intersector,
-    /// Area of the facets up to each, mm²; one whose first triangle has none adds nothing, for no ray can start there.
+    /// Area of the facets up to each, mm²; one whose first triangle has none adds nothing, because no ray can start there.
     areas: Vec<f64>,
     area: f64,
     seed: u64,

@@ -199,7 +199,7 @@ fn fill_crossing_borders<'i, 'a: 'i>(
 }
 
 /// Replaces, in `meshes`, faces with a diagonal that the shell has as a chord elsewhere too, by what `mesh` makes without it, and counts
-/// that in `budget`; [`MAX_ROUNDS`] times at most, for a new mesh may have another such diagonal. Returns the chords taken from each face.
+/// that in `budget`; [`MAX_ROUNDS`] times at most, as a new mesh may have another such diagonal. Returns the chords taken from each face.
 fn take_doubled_chords(
     part: &Part,
     meshes: &mut [Option<FaceMesh>],

@@ -98,7 +98,7 @@ fn plane_parts(p: &Plane, wires: &[Vec<WireEdge>]) -> Result<Parts, String> {
     if !(low.x < high.x && low.y < high.y) {
         return Err("a plane face without an extent".into());
     }
-    // The plane goes no farther than its loops, for a domain must be finite.
+    // The plane goes no farther than its loops, because a domain must be finite.
     let surface = sweep::plane(&frame, [[low.x, high.x], [low.y, high.y]]);
     let loops = oriented_loops(&surface, loops)?;
     Ok((surface, Analytic::Plane { frame }, false, loops, gap))

@@ -168,7 +168,7 @@ fn shell_bounds(shell: &Shell, edges: &[Edge]) -> Aabb {
 fn points_outward(shell: &Shell) -> Option<bool> {
     let samples: Vec<(Vector, Vector)> = shell.faces.iter().flat_map(face_samples).collect();
     let mut votes = 0i32;
-    // Many directions, for a face may be hidden, or missing, in some.
+    // Many directions, because a face may be hidden, or missing, in some.
     for k in 0..26 {
         // The 26 neighbours of a cell, slightly skewed so that flat sides do not tie.
         let c = if k < 13 { k } else { k + 1 };

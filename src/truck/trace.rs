@@ -201,7 +201,7 @@ fn solve_least_squares(du: Vector, dv: Vector, v: Vector) -> Uv {
         let (p, q) = (du.dot(v), dv.dot(v));
         return Uv::new(c * p - b * q, a * q - b * p) / determinant;
     }
-    // Parallel derivatives: along the longer one, for the other has no say.
+    // Parallel derivatives: along the longer one, because the other has no say.
     let one = |along: Vector, length2: f64| if length2 > 0.0 { along.dot(v) / length2 } else { 0.0 };
     if a > c { Uv::new(one(du, a), 0.0) } else { Uv::new(0.0, one(dv, c)) }
 }

@@ -106,7 +106,7 @@ fn parts_that_are_placed_often_are_built_once() {
     let [one, many] = &found;
     assert_eq!(count(many, "/scene/facets"), 70 * count(one, "/scene/facets"));
     assert_eq!(count(many, "/scene/patches"), count(one, "/scene/patches"));
-    // Some hundred rays, for the row is thin beside its length, and each is answered as the spline answers it.
+    // Some hundred rays, because the row is thin beside its length, and each is answered as the spline answers it.
     assert!(count(many, "/hits") > 500);
     assert_eq!([count(many, "/facets_vs_exact/unexplained"), count(many, "/octree_vs_bvh/disagree")], [0, 0]);
 }

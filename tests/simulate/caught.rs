@@ -74,7 +74,7 @@ fn light_does_not_pass_the_edge_between_two_facets() {
     assert_eq!((r.power.escaped, r.cut_off_rays), (0.0, 5000), "{:?}", r.power);
 }
 
-/// Bricks of one index of which one absorbs: no light is cut off, for it ends there by its power.
+/// Bricks of one index of which one absorbs: no light is cut off, because it ends there by its power.
 #[test]
 fn light_that_is_caught_beside_a_brick_that_absorbs_is_absorbed() {
     let mut world = World::default();

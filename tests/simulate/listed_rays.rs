@@ -82,7 +82,7 @@ fn every_ray_of_a_list_tells_where_it_ended() {
     assert!((mirror.power - 2.0).abs() < 0.6, "{}", mirror.power);
 }
 
-/// A ray that cannot start, for it is in more bodies than it can carry, is told of where it stands in the scene.
+/// A ray that cannot start, because it is in more bodies than it can carry, is told of where it stands in the scene.
 #[test]
 fn a_ray_that_cannot_start_is_placed_in_the_scene() {
     let mut world = World::default();

@@ -123,7 +123,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
         print(&(check_summary(&found, normals, console.width()) + &paired_receivers::summary(&receivers)))?;
         say_files(command, &found, console);
     }
-    // Last, for the answer counts although faces are missing.
+    // Last, because the answer counts although faces are missing.
     let refused = input_files::report_refusals(loaded, command.limits.max_refused, console);
     Ok(refused.and(report_defects(&found, console)))
 }
@@ -142,7 +142,7 @@ fn claim_output(command: &CheckCommand) -> Result<Option<OutputPlace>, Failure> 
     Ok(Some(owned))
 }
 
-/// Measures hits moved to the spline by themselves, for those on the facets say nothing of them: `polish` against `exact`.
+/// Measures hits moved to the spline by themselves, because those on the facets say nothing of them: `polish` against `exact`.
 fn measure_polished(found: &mut CrossCheck, [polish, exact]: [&dyn Intersector; 2], rays: &[Ray], loosest: f64) {
     let [distance, angle] = polished_errors(polish, exact, rays, loosest);
     found.facets_vs_exact.t_error_mm = distance;

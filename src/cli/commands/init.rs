@@ -65,7 +65,7 @@ pub(crate) fn run(
         let scene = shell_word(&scene_file.display().to_string());
         console.say(console.dim(&format!("  say what the parts are made of, then `lampyris trace {scene}`")));
     }
-    // Last, for the scene counts although faces are missing.
+    // Last, because the scene counts although faces are missing.
     Ok(input_files::report_refusals(&loaded, limits.max_refused, console))
 }
 
@@ -85,7 +85,7 @@ fn last_component(file: &Path) -> &OsStr {
 fn model_reference(file: &Path, scene_file: &Path) -> Option<String> {
     let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let is_beside = folder_of(&absolute(file)) == folder_of(&absolute(scene_file));
-    // A path beside the scene moves with it; any other must be absolute, for the scene may be read from elsewhere.
+    // A path beside the scene moves with it; any other must be absolute, because the scene may be read from elsewhere.
     let path = if is_beside { PathBuf::from(last_component(file)) } else { absolute(file) };
     path.into_os_string().into_string().ok()
 }

@@ -229,7 +229,7 @@ fn study_accuracy(
     progress: Report,
 ) -> Result<StudyResult, Failure> {
     let (scene, loaded, name) = read_model(command.file, console)?;
-    // Measured, for the study tells the sag reached and not the one asked for.
+    // Measured, because the study tells the sag reached and not the one asked for.
     let product = ModelMeshSource::measuring(&loaded.model);
     let mut settings = accuracy::Settings { seed, ..Default::default() };
     if let Some(range) = command.meshing.tolerance {

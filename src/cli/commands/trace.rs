@@ -248,7 +248,7 @@ fn trace_whole(
     closing::say_notes(&run.results.notes, prepared.bound.notes(), console);
     closing::print_listings(&run, prepared, console)?;
     closing::print_results(&document, &answer, folder, &run.results, with_report, console)?;
-    // Last of all, for it may fail where the results did not.
+    // Last of all, because it may fail where the results did not.
     let ends_written = end_file::write(prepared, extra.ends.as_deref(), console);
     // Only after everything was written: until then it is all that would be left.
     checkpoint.remove();

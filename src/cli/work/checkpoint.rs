@@ -82,7 +82,7 @@ impl<'a> Checkpoint<'a> {
         let commands = RunCommands::new(place.search.clone(), place.console);
         // Made before tracing: the files of the scene may be gone when it ends.
         let header = TallyHeader::new(prepared, place.scene, place.shard, commands)?;
-        // Here, for a run that is short or done saves nothing, which would remove them too.
+        // Here, because a run that is short or done saves nothing, which would remove them too.
         remove_stale(&place.file);
         Ok(Self { prepared, header, place, last: Mutex::new(Instant::now()) })
     }

@@ -78,7 +78,7 @@ fn is_of_report(name: &Path) -> bool {
 }
 
 /// Removes what an earlier run left in the folder, as far as its `results.json` and the names of its own tell, so that no file of it stands
-/// beside those of this run. Files that the scene names stay; a failure is passed over, for what is written next replaces most of them.
+/// beside those of this run. Files that the scene names stay; a failure is passed over, because what is written next replaces most of them.
 fn remove_earlier(prepared: &PreparedScene, folder: &Path) {
     let Some(earlier) = read_text(&folder.join("results.json")).ok() else { return };
     let Ok(earlier) = serde_json::from_str::<Value>(&earlier) else { return };

@@ -106,7 +106,7 @@ impl Kernel for Advance<'_, '_> {
 
 impl Walk<'_> {
     /// Sets `next` to the placement of the next box that the ray enters before its hit; false where there is none. The placement that the
-    /// ray leaves is passed over, for it was asked first.
+    /// ray leaves is passed over, because it was asked first.
     #[inline(always)]
     fn advance(&mut self) -> bool {
         let own = self.departure.and_then(|from| from.place);

@@ -93,7 +93,7 @@ static ORDERS: Orders = {
         let mut k = 0;
         while k < 8 {
             // The child in slot `p ^ octant` is mostly met as the p-th (see `octant_slots` in `flatten`): counted
-            // down, for the last one pushed is the first one popped.
+            // down, because the last one pushed is the first one popped.
             orders[octant][k] = (7 ^ k ^ octant) as u32;
             k += 1;
         }

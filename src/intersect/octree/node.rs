@@ -99,7 +99,7 @@ pub(super) struct Node {
     pub(super) bounds: [[u8; CHILDREN]; 6],
     pub(super) origin: [f32; 3],
     pub(super) step: [f32; 3],
-    /// 1: what is loaded with the steps as a fourth must be a normal number, for those below take a hundred times as long.
+    /// 1: what is loaded with the steps as a fourth must be a normal number, because those below take a hundred times as long.
     pub(super) one: f32,
     /// The axis along which the children of slots from eight on lie above the others.
     pub(super) long_axis: u32,

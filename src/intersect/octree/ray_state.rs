@@ -124,7 +124,7 @@ impl<const STACK: usize> RayState<STACK> {
     }
 }
 
-/// Calls [`crate::intersect::facet::Surroundings::lifted`] out of line, for few rays graze the facet that they leave.
+/// Calls [`crate::intersect::facet::Surroundings::lifted`] out of line, because few rays graze the facet that they leave.
 #[cold]
 #[inline(never)]
 fn lift(tree: &Tree, ray: &Ray) -> Ray {

@@ -1,6 +1,6 @@
 //! Where in space a curved facet is near: there alone a ray that starts at no surface must look for facets behind its start.
 //!
-//! A facet behind the start may stand for a piece of spline ahead of it, but only where it is curved, for a flat one lies on the spline.
+//! A facet behind the start may stand for a piece of spline ahead of it, but only where it is curved, as a flat one lies on the spline.
 //! Chips, boards and windows are flat, and light starts a hundredth of a millimetre over them: each of its rays found the chip behind it,
 //! and asked the facets a second time.
 

@@ -5,7 +5,7 @@
 //!
 //! The spline itself is asked where the facets may mislead: about a ray that leaves its surface so flat that its next root hides inside
 //! the sag, that starts between another face and that one's facets, or that is short; about a facet hit without a root nearby, inside
-//! the trims and crossed the same way; and about an answer that cannot be, for a ray that goes into a closed solid comes out of it, and
+//! the trims and crossed the same way; and about an answer that cannot be, because a ray that goes into a closed solid comes out of it, and
 //! the other way round. Without that a rod of 1 × 50 mm lost 8 % of its light and a ring 11 %.
 //!
 //! Guarantee: a hit marked [`Certainty::Polished`] lies on the spline within 1e-9 mm; any other is the spline's own answer, or of a ready

@@ -177,7 +177,7 @@ fn slope_chart(rows: &[&Value]) -> Chart {
             })
             .filter(|p| p[0] > 0.0 && p[1] > 0.0)
             .collect();
-        // From coarse to fine, for the theory starts at the coarsest.
+        // From coarse to fine, because the theory starts at the coarsest.
         points.sort_by(|a, b| b[0].total_cmp(&a[0]));
         let Some(&start) = points.first() else { continue };
         // The order of a cubic patch depends on how evenly its corners stand: no single slope to expect.

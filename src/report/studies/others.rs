@@ -22,7 +22,7 @@ fn bar_chart(
         .map(|layer| {
             let height = |category: &&str| {
                 let fits = |r: &&&Value| text(r, by) == *category && text(r, split) == layer;
-                // The last one counts, for a later row of the same names replaces the one before.
+                // The last one counts, because a later row of the same names replaces the one before.
                 rows.iter().filter(fits).filter_map(|r| number(r, value)).next_back()
             };
             (layer.to_owned(), categories.iter().map(height).collect())
@@ -167,7 +167,7 @@ fn growth_chart(rows: &[&Value]) -> Chart {
     let line = |method: &&str| {
         let own = rows.iter().filter(|r| text(r, "method") == *method);
         let point = |r: &&Value| {
-            // To a million rays, for the methods trace different numbers of them.
+            // To a million rays, because the methods trace different numbers of them.
             let rays = number(r, "rays")? / 1_000_000.0;
             Some([number(r, "patches")?, number(r, "seconds_trace_median")? / rays])
         };

@@ -5,7 +5,7 @@ use crate::optics::{Spectrum, Table, Wavelengths};
 use crate::simulate::scene::{PowerUnit, Source};
 use crate::simulate::wavelength_text::wavelength_range_text;
 
-/// What there is to do about a file whose powers can be taken as proportions, for all its light has one spectrum.
+/// What there is to do about a file whose powers can be taken as proportions, because all its light has one spectrum.
 pub(super) const GIVE_POWER: &str =
     "give the source's `power` in watts, for the file's powers to be proportions alone";
 

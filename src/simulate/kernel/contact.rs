@@ -120,7 +120,7 @@ pub(super) struct LeftContact {
 
 impl LeftContact {
     /// Whether a face that lies along the contact is one that the light on `next` has crossed there or was reflected at: one by which it
-    /// cannot enter or leave a body, for it is in it already or no more.
+    /// cannot enter or leave a body, because it is in it already or no more.
     ///
     /// What is entered against the face that it leaves counts as the second of the pair too, unless the body that the light is in ends
     /// there: where two bodies lie side by side on a third, the one that light was taken to enter need not be the one that it meets.

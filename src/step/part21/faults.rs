@@ -36,7 +36,7 @@ impl<'a> Faults<'a> {
 }
 
 /// Returns where to go on behind a fault in the statement that began at `start` and was read up to `at`: the next ';' that ends a line or a
-/// statement, for an open text must not swallow the statements after it.
+/// statement, because an open text must not swallow the statements after it.
 pub(super) fn next_statement(source: &[u8], start: usize, at: usize) -> usize {
     let mut i = start;
     while let Some(offset) = source[i..].iter().position(|&b| b == b';') {

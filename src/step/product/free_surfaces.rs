@@ -48,7 +48,7 @@ pub(crate) fn convert_free_surfaces(
         match outcome {
             Ok((built, boundaries)) => {
                 let numbers = number_boundaries(boundaries, part);
-                // Unnamed where the file gives no text; the entity itself is there, for it was converted.
+                // Unnamed where the file gives no text; the entity itself is there, because it was converted.
                 let name = geometry.file.entity(id).map(|e| e.args().name(0)).unwrap_or_default();
                 let face = add_face(built, id, name, part, &numbers, styles);
                 part.shells.push(Shell { faces: vec![face], ..Shell::default() });

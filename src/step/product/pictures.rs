@@ -1,7 +1,7 @@
 //! Meshes that are pictures of exact shapes: both would stand in one place, and light would meet the shape twice.
 //!
 //! A tessellated item that names the exact shape which it shows is left out where that stands; it is brought back where none of the
-//! shape's faces could be converted, for it is all that there is then. One that names none is left out, by name, where it lies within the
+//! shape's faces could be converted, as it is all that there is then. One that names none is left out, by name, where it lies within the
 //! exact body of the same product and is about as large. Known weakness: a mesh that is no picture but lies in the body, and is half as
 //! large, is taken for one; and the bodies of such products are converted twice, once for their boxes.
 

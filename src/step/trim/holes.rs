@@ -135,7 +135,7 @@ pub(super) fn place_hole(
     repairs: &mut Vec<&'static str>,
 ) -> Chain {
     let outline = Outline::new(hole.polygon());
-    // Most of a few places decide, for one may lie on the border; a shift with all of them inside is the better one.
+    // Most of a few places decide, because one may lie on the border; a shift with all of them inside is the better one.
     let shift_into = |border: &Outline, least: usize| {
         let counts =
             [0, 1].map(|d| chart.period[d].map_or(vec![0], |p| period_counts(outline.bounds, border.bounds, d, p)));

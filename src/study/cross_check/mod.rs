@@ -200,7 +200,7 @@ impl Tally {
         }
         let cause = classifier.compare(ray, octree.as_ref(), exact.as_ref());
         self.count_cause(cause, octree, exact);
-        // A hit that only one has is kept whatever its cause, for it changes where the light goes.
+        // A hit that only one has is kept whatever its cause, because it changes where the light goes.
         let flipped = octree.is_some() != exact.is_some();
         if facets_differ || flipped || cause.is_some_and(|c| c != Cause::WithinSag) {
             self.kept.push(Disagreement { index, ray: *ray, octree, bvh, exact, cause, facets_differ });

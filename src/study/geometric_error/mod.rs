@@ -123,7 +123,7 @@ impl GeometricError {
         Self { receivers: bound.receivers.iter().map(|r| unchanged(&r.name)).collect(), ..Self::default() }
     }
 
-    /// The error of a power that facets changed on none of these rays: that of one of them, for one in so many may differ. Of a hemisphere
+    /// The error of a power that facets changed on none of these rays: that of one of them, as one in so many may differ. Of a hemisphere
     /// that reflects all light facets let pass what no such ray met, and the error was told to be none. 0 for facets that are the surface.
     pub(in crate::study) fn unseen_power(&self, emitted: f64) -> f64 {
         if self.rays > 0 { emitted / self.rays as f64 } else { 0.0 }

@@ -40,7 +40,7 @@ struct BoxedFace {
 /// sorted, and the faces in them, carriers with a tightened tolerance.
 ///
 /// A face is either carrier or guest; what lies wholly on its carrier has no other. Of faces that touch in a circle of odd length a pair is
-/// left out. Planes are, for their facets coincide as they are.
+/// left out. Planes are, because their facets coincide as they are.
 pub(super) fn contacts<'m>(
     model: &'m Model,
     places: &[PlacedPart<'m>],
@@ -144,7 +144,7 @@ fn with_one_role_each(mut all: Vec<Contact>) -> Vec<Contact> {
     });
     let roles: Vec<(usize, bool)> = (0..keys.len()).map(|k| root_of(&turns, k)).collect();
     // What speaks for the root of each tree as a carrier, less what speaks against: contacts in whole that stay so; then faces that touch
-    // several, for a carrier's facets are made once; then the order of the faces, so that nothing depends on chance.
+    // several, because a carrier's facets are made once; then the order of the faces, so that nothing depends on chance.
     let mut degree = vec![0i64; keys.len()];
     all.iter().flat_map(ends).for_each(|k| degree[k] += 1);
     let mut votes = vec![[0i64; 3]; keys.len()];

@@ -106,7 +106,7 @@ fn choose_seam_side(face: &TrimmedFace<'_>, mut uv: Uv, middle: Uv, near: f64) -
     let surface = &face.surface;
     let place = surface.point(uv);
     if let Some(across) = surface.pole(uv) {
-        // The nearest end, for a projected place is only near the pole; all along the pole is one place.
+        // The nearest end, because a projected place is only near the pole; all along the pole is one place.
         let [a, b] = surface.spline.domain()[across];
         uv[across] = if uv[across] - a < b - uv[across] { a } else { b };
         uv[1 - across] = middle[1 - across];

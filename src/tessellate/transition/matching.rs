@@ -100,7 +100,7 @@ impl Matching<'_> {
     /// exist. Leaves the way in `via`, which the next search overwrites.
     fn path_from(&mut self, start: usize) -> Option<(usize, usize)> {
         let mut queue = VecDeque::from([(start, 0)]);
-        // A mark that no other search leaves, for each start searches once.
+        // A mark that no other search leaves, because each start searches once.
         self.reached[start] = Some(start);
         while let Some((t, depth)) = queue.pop_front() {
             let open: Vec<usize> = self.by_triangle.of_triangle(t).collect();
