@@ -5,10 +5,10 @@ use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::path::PathBuf;
 
-/// What such files are called, with who writes them.
+/// How the names of such files begin; what follows names the process that writes them.
 const NAME: &str = "lampyris-rays";
 
-/// A file without a name that anybody needs; removed when it is dropped, and by whoever comes next if its process was killed.
+/// A file that no one needs by name; removed when it is dropped or, if its process was killed, by the next process that makes one.
 #[derive(Debug)]
 pub(super) struct ScratchFile {
     pub(super) file: File,

@@ -79,7 +79,7 @@ impl FacetMesh {
             last_face = face.max(last_face);
         })?;
         let sag: Vec<f64> = from.array()?;
-        // Told here once for all who index by these numbers later.
+        // Checked here once, so that all code behind may index by these numbers.
         let is_whole = (sag.is_empty() || sag.len() == facets.len())
             && (vertices.is_empty() || (last_position as usize) < positions.len())
             && (facets.is_empty() || ((last_vertex as usize) < vertices.len() && (last_face as usize) < faces));

@@ -122,7 +122,7 @@ impl PreparedScene {
             surfaces: OnceLock::new(),
             few_ray_surfaces: OnceLock::new(),
         };
-        // Whoever asks for anything of how it is traced gets just that.
+        // A run that is told anything of how it is traced has no choice made for it.
         let is_open = !is_accuracy_asked(&prepared.job.meshing, &prepared.job.tracing, &prepared.job.scene);
         let known = if is_open { prepared.known_choice(monitor) } else { None };
         if let Some(chosen) = known {

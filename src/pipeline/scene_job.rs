@@ -74,7 +74,7 @@ impl SceneJob {
         let fetch = || -> Option<Vec<FacetMesh>> {
             groups.iter().zip(&keys).map(|(group, key)| kept(key).mesh(group.placed_face_count())).collect()
         };
-        // The last group is kept last: who waits for it has them all.
+        // The last group is kept last: a process that has waited for it finds them all.
         let kept_or_turn = keys.last().map(|last| kept(last).mesh_or_turn(fetch));
         let _turn = match kept_or_turn {
             Some(Ok(meshes)) => {

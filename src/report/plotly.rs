@@ -271,7 +271,7 @@ fn shape(shape: &Shape, [low, high]: [f32; 2]) -> Value {
                 "j": indices(triangles.iter().map(|t| t[1])), "k": indices(triangles.iter().map(|t| t[2])),
                 "opacity": opacity, "flatshading": true, "hoverinfo": "name",
                 "lighting": lighting(0.35, 0.65, 0.15),
-                // Above and to the right of who looks: under an orthographic camera plotly turns normals away from the viewer, and a light
+                // Above and to the right of the viewer: under an orthographic camera plotly turns normals away from the viewer, and a light
                 // before the part left all that is seen in the shade.
                 "lightposition": {"x": -600, "y": 1500, "z": -2500}});
             if !labels.is_empty() {

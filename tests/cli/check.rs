@@ -128,7 +128,8 @@ fn rays_within_a_thin_wall_start_within_it() {
     assert_eq!(code, 0, "{err}");
     let found: Value = serde_json::from_str(&out).unwrap();
     assert_eq!(count(&found, "/rays"), 3000);
-    // A third come from the source, a third begin within the lens, 7 mm thick, and meet its other side; 12 mm off their side they would not.
+    // A third come from the source, a third begin within the lens, 7 mm thick, and meet its other side; 12 mm off their side they would
+    // not.
     assert!(count(&found, "/hits") > 1900, "{found}");
     assert!(count(&found, "/facets_vs_exact/hit_miss") < 30, "{}", found["facets_vs_exact"]);
 }

@@ -40,7 +40,7 @@ pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
     let mut limits = [SieveLimits::default(); WIDTH];
     let mut live = order.len().min(WIDTH);
     let mut next = live;
-    // As many as fit are under way; whoever ends hands its place to the next.
+    // As many as fit are under way; a ray that ends hands its place to the next.
     let mut ways = Ways::default();
     for (ray, (state, &place)) in states.iter_mut().zip(order).enumerate().take(live) {
         let place = usize::from(place);

@@ -180,7 +180,7 @@ impl Emitter {
 
     /// Returns the point or the direction that all its rays have, to the bit; `None` where they have neither.
     pub(crate) fn beam(&self) -> Option<Beam> {
-        // A beam is promised only where all rays have the very point or direction: who is told relies on it to the bit.
+        // A beam is promised only where all rays have the very point or direction: an intersector relies on it to the bit.
         let (origin, direction) = (self.frame.origin, self.frame.z);
         match (&self.shape, &self.lobe) {
             // Their starts are moved, each along its own direction.

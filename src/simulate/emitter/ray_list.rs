@@ -11,7 +11,7 @@ use crate::optics::{Wavelengths, xyz_of_watt};
 use crate::simulate::scene::{PowerUnit, Source};
 use std::sync::Arc;
 
-/// Fewest rays whose powers are summed together: who draws a ray reads as many. Fewer would cost a read from the disk no less.
+/// Fewest rays whose powers are summed together: to draw a ray, as many are read. To read fewer from the disk would take no less time.
 const SMALLEST_BLOCK: u64 = 32;
 
 /// Most sums that a list holds in memory, 16 MB; of longer lists the blocks are larger.
