@@ -4,7 +4,7 @@ use super::cache::{Cache, MODEL, PROGRAM};
 use super::monitor::Monitor;
 use crate::mesh::arrays::ArrayReader;
 use crate::simulate::Fingerprint;
-use crate::step::{self, Import, Source};
+use crate::step::{self, Import, StepText};
 use std::path::Path;
 
 /// Reads a STEP file, or takes the model of a file of the same name and bytes from the cache, as it was read with these settings, and else
@@ -20,7 +20,7 @@ pub(super) fn read_step(
 ) -> Result<Import, step::Error> {
     let Some(cache) = cache else { return step::read(path, settings) };
     let (name, bytes) = step::read_file(path)?;
-    let source = Source::new(&name, &bytes, settings);
+    let source = StepText::new(&name, &bytes, settings);
     let entry = format!("{}{MODEL}", Fingerprint::new(&[PROGRAM.as_bytes(), source.key().as_bytes()]).0);
     let fetch = || cache.fetch(&entry, monitor, |from: &mut ArrayReader| source.read(from));
     let _turn = match cache.fetch_or_turn(&entry, fetch) {

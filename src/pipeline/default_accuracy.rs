@@ -41,7 +41,7 @@ pub(super) struct OpenRun<'a> {
 }
 
 /// Makes what a pilot compares, for a model in one piece or in groups.
-struct Source<'a> {
+struct ModelPilotSource<'a> {
     model: &'a Model,
     /// The facets of the default tolerance, which say how the model is grouped.
     made: &'a GroupedFacets,
@@ -52,7 +52,7 @@ struct Source<'a> {
     exact: OnceCell<Box<dyn Intersector + 'a>>,
 }
 
-impl PilotSource for Source<'_> {
+impl PilotSource for ModelPilotSource<'_> {
     fn facets(&self, tolerance: [f64; 2]) -> TimedFacets {
         let settings = tessellate::Settings { tolerance, ..self.mesher.clone() };
         let (facets, seconds) = tessellate_groups(self.model, self.made.instancing.as_ref(), &settings);
@@ -91,7 +91,7 @@ pub(super) fn choose<'a>(
     let OpenRun { model, bound, run, facets, mesher } = open;
     let instancing = facets.instancing.as_deref();
     let models = instancing.map_or(slice::from_ref(model), |i| &i.groups);
-    let source = Source { model, made: facets, mesher, surfaces, exact: OnceCell::new() };
+    let source = ModelPilotSource { model, made: facets, mesher, surfaces, exact: OnceCell::new() };
     in_stage(monitor, Stage::Choosing, || {
         let tolerance = mesher.tolerance;
         default_accuracy::choose(&UndecidedRun { models, bound, run, source: &source, facets, tolerance })
@@ -102,7 +102,7 @@ pub(super) fn choose<'a>(
 pub(super) fn needs_pilot(open: OpenRun<'_>) -> bool {
     let OpenRun { model, bound, run, facets, mesher } = open;
     let models = facets.instancing.as_deref().map_or(slice::from_ref(model), |i| &i.groups);
-    let source = Source { model, made: facets, mesher, surfaces: &|| &[], exact: OnceCell::new() };
+    let source = ModelPilotSource { model, made: facets, mesher, surfaces: &|| &[], exact: OnceCell::new() };
     let tolerance = mesher.tolerance;
     UndecidedRun { models, bound, run, source: &source, facets, tolerance }.needs_pilot()
 }

@@ -5,7 +5,7 @@ use super::prepared_scene::{PreparedScene, TraceRequest};
 use crate::simulate::{GROWING_REPLICATE, PartialRun, Results};
 
 /// The most rays, where the settings do not say.
-const MOST_RAYS: u64 = 10_000_000_000;
+const MOST_SEARCHED_RAYS: u64 = 10_000_000_000;
 /// Standard deviations of an error's own error that [`growth_margin`] leaves room for: of 25 searches one traces once more.
 const MARGIN_SIGMAS: f64 = 2.0;
 /// Largest such margin: of few replicates one more run costs less than rays that nobody needs.
@@ -72,7 +72,7 @@ impl GrowingSearch<'_> {
 
 /// Returns the most rays that a run of a search may have.
 pub(super) fn most_rays(prepared: &PreparedScene) -> u64 {
-    prepared.job.tracing.rays().unwrap_or(MOST_RAYS)
+    prepared.job.tracing.rays().unwrap_or(MOST_SEARCHED_RAYS)
 }
 
 /// Returns the factor by which to exceed the number of rays that an error asks for: an error found from so many replicates has an error
@@ -119,8 +119,8 @@ mod tests {
     fn runs_grow_at_least_twofold_and_at_most_64_fold() {
         let next = |growth: f64| next_rays(1_000, growth, 50_000);
         assert_eq!([1.1, 2.0, 4.4, 50.0, 1e9].map(next), [2_000, 2_000, 4_400, 50_000, 50_000]);
-        assert_eq!(next_rays(1_000, 1e9, MOST_RAYS), 64_000);
+        assert_eq!(next_rays(1_000, 1e9, MOST_SEARCHED_RAYS), 64_000);
         // 907,109,336 of a source a billion times as strong as the next: with another division than before, none were left for that.
-        assert_eq!(next_rays(204_800_000, 4.429_244, MOST_RAYS), 907_110_000);
+        assert_eq!(next_rays(204_800_000, 4.429_244, MOST_SEARCHED_RAYS), 907_110_000);
     }
 }

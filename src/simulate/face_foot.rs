@@ -10,7 +10,7 @@ const SAMPLES: usize = 24;
 
 /// Steps of Gauss–Newton. It contracts by distance over radius of curvature: so many are enough for points nearer than 0.8 of it, and
 /// points on the face take five.
-const MOST_STEPS: usize = 100;
+const GAUSS_NEWTON_STEPS: usize = 100;
 
 /// Determinant of the normal equations, over its largest possible value, below which both derivatives point the same way: 1e-7 rad
 /// apart, where solving would lose all digits.
@@ -119,7 +119,7 @@ pub(crate) fn foot_from(
     let s = &face.surface;
     let mut best = start;
     let mut uv = start.uv;
-    for _ in 0..MOST_STEPS {
+    for _ in 0..GAUSS_NEWTON_STEPS {
         let d = s.derivatives(uv);
         let r = p - d.point;
         let (a, b, c) = (d.du.length_squared(), d.du.dot(d.dv), d.dv.length_squared());

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Most lost rays that are kept; those of the lowest index.
-pub(crate) const LEDGER: usize = 1000;
+pub(crate) const MOST_LOST_KEPT: usize = 1000;
 
 /// What one replicate gathered.
 #[derive(Debug)]
@@ -188,16 +188,16 @@ impl ReplicateTally {
         self.counts.lost += 1;
         self.ledger.push(lost);
         // Cut at twice what is kept, so that sorting happens seldom however many rays are lost.
-        if self.ledger.len() >= 2 * LEDGER {
+        if self.ledger.len() >= 2 * MOST_LOST_KEPT {
             trim_ledger(&mut self.ledger);
         }
     }
 }
 
-/// Sorts lost rays by index and keeps the first [`LEDGER`].
+/// Sorts lost rays by index and keeps the first [`MOST_LOST_KEPT`].
 fn trim_ledger(ledger: &mut Vec<LostRay>) {
     ledger.sort_by_key(|l| (l.ray, l.branch));
-    ledger.truncate(LEDGER);
+    ledger.truncate(MOST_LOST_KEPT);
 }
 
 /// All sums of a run, or of the replicates of one shard.

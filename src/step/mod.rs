@@ -39,4 +39,4 @@ pub(crate) use import::read_file;
 pub use import::{Import, read, read_bytes};
 pub use report::{FaceCounts, ImportReport, Note, PlacedCounts, Seconds, SurfaceCounts, UnitNames};
 pub use settings::Settings;
-pub(crate) use stored::Source;
+pub(crate) use stored::StepText;

@@ -8,8 +8,8 @@ use crate::model::Model;
 use std::io::{self, Write};
 use std::time::Instant;
 
-/// A file whose model is wanted, of which the text alone was read.
-pub(crate) struct Source<'s> {
+/// The text of a file whose model is wanted, before it is read.
+pub(crate) struct StepText<'s> {
     name: &'s str,
     bytes: &'s [u8],
     settings: &'s Settings,
@@ -17,7 +17,7 @@ pub(crate) struct Source<'s> {
     start: Instant,
 }
 
-impl<'s> Source<'s> {
+impl<'s> StepText<'s> {
     /// Takes the bytes of a STEP file; `name` is for messages and the model's name, as in [`read_bytes`].
     pub(crate) fn new(name: &'s str, bytes: &'s [u8], settings: &'s Settings) -> Self {
         Self { name, bytes, settings, hash: hash_bytes(bytes), start: Instant::now() }
@@ -79,7 +79,7 @@ mod tests {
                 continue;
             }
             let bytes = std::fs::read(&path).unwrap();
-            let source = Source::new("part.stp", &bytes, &settings);
+            let source = StepText::new("part.stp", &bytes, &settings);
             let Ok(Import { model, report }) = source.import() else { continue };
             let import = Import { model, report: ImportReport { peak_bytes: Some(7), ..report } };
             let mut kept = Vec::new();

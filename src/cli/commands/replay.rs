@@ -2,7 +2,7 @@
 
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
-use crate::cli::output::closing::LEDGER;
+use crate::cli::output::closing::LOST_RAYS_FILE;
 use crate::cli::output::json::json_text;
 use crate::cli::work::lost_rays::COLUMNS;
 use crate::cli::work::output_place::make_folder;
@@ -49,7 +49,7 @@ pub(crate) fn parse_request(words: &[String]) -> Result<ReplayRequest, Failure> 
         }
         let text = read_text(Path::new(word)).map_err(|e| {
             Failure::input(format!("--replay {word}: {e}"))
-                .with_help(format!("give the number of a ray, or a {LEDGER} of an earlier run"))
+                .with_help(format!("give the number of a ray, or a {LOST_RAYS_FILE} of an earlier run"))
         })?;
         read_ledger(&text, &mut request).map_err(|m| Failure::input(format!("--replay {word}: {m}")))?;
     }

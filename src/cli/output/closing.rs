@@ -22,7 +22,7 @@ const LINE_LENGTH: usize = 96;
 const PATH_COLUMNS: usize = LINE_LENGTH / 2;
 
 /// Name of the list of lost rays in a folder of results.
-pub(crate) const LEDGER: &str = "lost_rays.csv";
+pub(crate) const LOST_RAYS_FILE: &str = "lost_rays.csv";
 
 /// Prints what was asked for beside the figures: power by face and light by sequence. Nothing where neither was.
 pub(crate) fn print_listings(
@@ -92,7 +92,10 @@ fn notable_files(folder: &Path, results: &Results) -> Vec<(PathBuf, String)> {
         ));
     }
     if !results.ledger.is_empty() {
-        files.push((folder.join(LEDGER), "the lost rays; `lampyris trace` shows their paths with --replay".into()));
+        files.push((
+            folder.join(LOST_RAYS_FILE),
+            "the lost rays; `lampyris trace` shows their paths with --replay".into(),
+        ));
     }
     files.push((folder.join("facets.glb"), "facets and ray paths in 3-D, for any glTF viewer".into()));
     files

@@ -3,7 +3,7 @@
 use crate::cli::completion::Completion;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
-use crate::cli::output::closing::LEDGER;
+use crate::cli::output::closing::LOST_RAYS_FILE;
 use crate::formats::{csv_quoted_text, printable_line, write_atomic};
 use crate::pipeline::PreparedScene;
 use crate::simulate::{LostRay, PartialRun, Results};
@@ -20,7 +20,7 @@ pub(crate) fn write(folder: &Path, results: &Results, prepared: &PreparedScene) 
         return Ok(false);
     }
     let settings = prepared.run_settings();
-    write_atomic(&folder.join(LEDGER), |w| {
+    write_atomic(&folder.join(LOST_RAYS_FILE), |w| {
         writeln!(w, "{COLUMNS}")?;
         for l in &results.ledger {
             let power = l.quanta as f64 * results.quantum;
@@ -73,7 +73,7 @@ pub(crate) fn report_lost_light(
     let listed = if is_cut { format!("the first {recorded} of them") } else { "them all".into() };
     say_beyond([share, max_lost], "the energy", console, || {
         let reasons = reasons(&results.ledger, results.lost_rays, prepared);
-        format!("{reasons}; {} lists {listed}", folder.join(LEDGER).display())
+        format!("{reasons}; {} lists {listed}", folder.join(LOST_RAYS_FILE).display())
     })
 }
 

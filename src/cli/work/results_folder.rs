@@ -7,7 +7,7 @@ use super::run_commands::RunCommands;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::machine;
-use crate::cli::output::closing::{LEDGER, target_sentence};
+use crate::cli::output::closing::{LOST_RAYS_FILE, target_sentence};
 use crate::cli::output::face_tables;
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::sentences::plain_sentence;
@@ -34,7 +34,7 @@ pub(crate) const MOST_DRAWN: usize = 24_000;
 const FACET_BYTES: u64 = 50;
 
 /// Files of every folder of results.
-const OWN_FILES: [&str; 5] = ["results.json", "report.html", "facets.glb", "paths.vtp", LEDGER];
+const OWN_FILES: [&str; 5] = ["results.json", "report.html", "facets.glb", "paths.vtp", LOST_RAYS_FILE];
 /// Folders of the report's pictures and tables, with the extensions of the files in them.
 const REPORT_FOLDERS: [(&str, &[&str]); 2] = [("figures", &["svg", "png"]), ("tables", &["csv"])];
 
@@ -203,7 +203,7 @@ pub(crate) fn write(
         document["left_out"] = rule_table::left_out_document(left_out);
     }
     if has_lost_rays {
-        document["ledger"] = LEDGER.into();
+        document["ledger"] = LOST_RAYS_FILE.into();
     }
     let text = json_text(&document)?;
     write_atomic(&folder.join("results.json"), |w| w.write_all(text.as_bytes()))?;
