@@ -38,6 +38,8 @@ pub(crate) struct TrimRegion {
     bands: Vec<Vec<[Uv; 2]>>,
     low: f64,
     height: f64,
+    /// Lower and upper corner of a box around the loops; without a meaning for an untrimmed face.
+    bounds: [Uv; 2],
 }
 
 impl TrimRegion {
@@ -46,10 +48,10 @@ impl TrimRegion {
         let polygons: Vec<Vec<Uv>> = face.bounding_loops().iter().map(fine_polygon).collect();
         let sides = || polygons.iter().flat_map(|polygon| polygon_sides(polygon));
         let count = sides().count();
-        let (low, high) = (polygons.iter().flatten())
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p.y), high.max(p.y)));
-        let mut region =
-            Self { bands: vec![Vec::new(); count.div_ceil(2).min(MOST_BANDS)], low, height: high - low };
+        let bounds =
+            polygons.iter().flatten().fold([Uv::MAX, Uv::MIN], |[low, high], p| [low.min(*p), high.max(*p)]);
+        let (low, height) = (bounds[0].y, bounds[1].y - bounds[0].y);
+        let mut region = Self { bands: vec![Vec::new(); count.div_ceil(2).min(MOST_BANDS)], low, height, bounds };
         for side in sides() {
             let [a, b] = side.map(|p| region.band(p.y));
             region.bands[a.min(b)..=a.max(b)].iter_mut().for_each(|band| band.push(side));
@@ -62,6 +64,22 @@ impl TrimRegion {
         let last = self.bands.len() - 1;
         // The same arithmetic for sides and points, so that a point's band has every side at its height. A cast cuts what is negative.
         ((((v - self.low) / self.height) * self.bands.len() as f64) as usize).min(last)
+    }
+
+    /// Returns lower and upper corner of a box around the loops; `None` without loops.
+    pub(crate) fn bounds(&self) -> Option<[Uv; 2]> {
+        (!self.bands.is_empty()).then_some(self.bounds)
+    }
+
+    /// Whether the box between two corners may hold a point inside the loops; a `true` in vain costs time alone.
+    pub(crate) fn may_reach(&self, low: Uv, high: Uv) -> bool {
+        if self.bands.is_empty() {
+            return true;
+        }
+        let is_near = |[a, b]: &[Uv; 2]| a.min(*b).cmple(high).all() && a.max(*b).cmpge(low).all();
+        let bands = &self.bands[self.band(low.y)..=self.band(high.y)];
+        // Without a side in it the box is all inside or all outside.
+        bands.iter().flatten().any(is_near) || self.contains(0.5 * (low + high))
     }
 
     /// Whether a parameter point lies inside the loops; without loops every point does.
@@ -131,6 +149,21 @@ pub(crate) mod tests {
                 && !region.contains(Uv::new(0.0, 11.0))
                 && !region.contains(Uv::new(0.0, -11.0))
         );
+    }
+
+    #[test]
+    fn boxes_that_the_trims_do_not_reach_are_known() {
+        let region = TrimRegion::new(&disc(10.0));
+        let [low, high] = region.bounds().unwrap();
+        assert!((low - Uv::splat(-10.0)).length() < 1e-4 && (high - Uv::splat(10.0)).length() < 1e-4);
+        for (corner, reached) in
+            [([-1.0, -1.0], true), ([6.5, 6.5], true), ([8.0, 8.0], false), ([-12.0, 0.0], false)]
+        {
+            let corner = Uv::from(corner);
+            assert_eq!(region.may_reach(corner, corner + Uv::ONE), reached, "{corner}");
+        }
+        let whole = TrimRegion::new(&Face::whole(sweep::plane(&Frame::IDENTITY, [[-1.0, 1.0]; 2])));
+        assert!(whole.bounds().is_none() && whole.may_reach(Uv::ZERO, Uv::ONE));
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! Sources on faces and from files, and the honesty of stated errors.
 
-use crate::support::World;
+use crate::support::{Shape, World};
 use lampyris::formats::{LightRay, PhotometricType, Photometry, write_data1, write_ies, write_rays};
-use lampyris::math::{Point, Vector};
-use lampyris::model::Model;
+use lampyris::math::{Frame, Homogeneous, Point, Uv, Vector};
+use lampyris::model::{EdgeUse, Face, Model, TrimLoop};
+use lampyris::nurbs::{Surface, UvCurve};
 use lampyris::simulate::{RunSettings, Scene, rays_of_run, simulate};
 use std::f64::consts::PI;
 use std::path::Path;
@@ -39,6 +40,43 @@ fn a_shining_face_of_a_box() {
     // 0.01 mm above the face the light is still where it left: RMS of an even 4 × 2 rectangle is 2/√3 and 1/√3.
     let rms = r.receivers[0].rms;
     assert!((rms[0] - 2.0 / 3f64.sqrt()).abs() < 0.02 && (rms[1] - 1.0 / 3f64.sqrt()).abs() < 0.02, "{rms:?}");
+}
+
+/// Knots tell nothing of lengths: a flat face of 101 even spans, of which one is 18 of its 20 mm long, shines by area. The root mean square
+/// of an even line of ±10 mm is 10/√3; of its ends alone it would be 9.5.
+#[test]
+fn a_face_shines_evenly_whatever_its_knots() {
+    const SPANS: usize = 101;
+    let mut world = World::default();
+    world.part("sheet", false, &[("z1", Shape::Rectangle { frame: Frame::IDENTITY, half: [10.0, 1.0] })]);
+    let x = |i: usize| if i < 50 { -10.0 + i as f64 / 49.0 } else { 9.0 + (i - 50) as f64 / 51.0 };
+    let corners = (0..=SPANS).flat_map(|i| [-1.0, 1.0].map(|y| Point::new(x(i), y, 0.0)));
+    let inner = (0..=SPANS).map(|knot| knot as f64);
+    let surface = Surface {
+        degree: [1, 1],
+        knots: [std::iter::once(0.0).chain(inner).chain([SPANS as f64]).collect(), vec![-1.0, -1.0, 1.0, 1.0]],
+        points: corners.map(|p| Homogeneous::new(p.x, p.y, p.z, 1.0)).collect(),
+    };
+    world.model.parts[0].shells[0].faces[0] = Face { name: "z1".into(), ..Face::whole(surface) };
+    let text = "[run]\nrays = 50_000\n[[source]]\nkind = 'lambertian'\non = { part = 'sheet' }\n\
+        [[receiver]]\nname = 'near'\nat = [0, 0, 0.001]\nsize = [22, 4]\ncells = [22, 4]\n";
+    let rms = world.run(text, |_| ()).receivers[0].rms;
+    assert!((rms[0] - 10.0 / 3f64.sqrt()).abs() < 0.05, "{rms:?}");
+}
+
+/// A face of 0.4 × 0.4 mm that is trimmed from a plane of 100 × 100 mm shines from where it is, and in no time.
+#[test]
+fn a_small_part_of_a_large_surface_shines_alone() {
+    let mut world = World::default();
+    world.part("patch", false, &[("z1", Shape::Rectangle { frame: Frame::IDENTITY, half: [50.0, 50.0] })]);
+    let corners = [[19.8, 19.8], [20.2, 19.8], [20.2, 20.2], [19.8, 20.2]].map(Uv::from);
+    let line = |k: usize| UvCurve::line(corners[k], corners[(k + 1) % 4], [0.0, 1.0]);
+    let side = |k: usize| EdgeUse { edge: None, reversed: false, uv: line(k) };
+    world.model.parts[0].shells[0].faces[0].loops = vec![TrimLoop { uses: (0..4).map(side).collect() }];
+    let text = "[run]\nrays = 20_000\n[[source]]\nkind = 'lambertian'\non = { part = 'patch' }\n\
+        [[receiver]]\nname = 'near'\nat = [0, 0, 0.001]\nsize = [100, 100]\ncells = [4, 4]\n";
+    let r = &world.run(text, |_| ()).receivers[0];
+    assert!((r.centroid[0] - 20.0).abs() < 0.02 && (r.centroid[1] - 20.0).abs() < 0.02, "{:?}", r.centroid);
 }
 
 #[test]
