@@ -198,6 +198,19 @@ mod tests {
         assert_eq!(Spectrum::line(555.0).single_line(), Some(555.0));
     }
 
+    /// A laser of 0.05 nm has its lumens wherever it lies between the steps of a nanometre, and however dark the table is beside it.
+    #[test]
+    fn the_eye_sees_a_narrow_peak_of_a_wide_table() {
+        for at in [532.0, 531.93, 532.0625, 532.5] {
+            let peak = [(at - 0.05, 0.0), (at, 1.0), (at + 0.05, 0.0)];
+            let wide = [(400.0, 0.0)].into_iter().chain(peak).chain([(700.0, 0.0)]);
+            for table in [Table::new("spectrum", wide), Table::new("spectrum", peak)] {
+                let ratio = Spectrum::Table(table.unwrap()).sampler().unwrap().efficacy() / xyz_of_watt(at)[1];
+                assert!((ratio - 1.0).abs() < 1e-3, "{at} nm: {ratio}");
+            }
+        }
+    }
+
     #[test]
     fn a_black_body_peaks_where_wien_says() {
         // b = 2.897771955e6 nm·K; the peak of the density lies within a step of it.

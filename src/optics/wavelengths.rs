@@ -133,20 +133,13 @@ impl Wavelengths {
                     before = s;
                 }
             }
-            Kind::Continuous(_) => {
-                let mut range = self.range_nm();
-                if range[1] - range[0] > MOST_EVEN_NM {
-                    let [first, last] = observer_range();
-                    range = range.map(|nm| nm.clamp(first, last));
-                }
-                let [a, b] = range;
-                // Simpson on quarter nanometres: exact where table and observer are linear, so but for their corners.
-                let n = 8 * steps(b - a);
-                let h = (b - a) / n as f64;
-                for i in 0..=n {
-                    let weight = if i == 0 || i == n { 1.0 } else { f64::from(2 + 2 * (i as u32 % 2)) };
-                    let nm = a + h * i as f64;
-                    add(nm, weight * h / 3.0 * self.density(nm));
+            Kind::Continuous(points) => {
+                // Between two of these spectrum and observer are linear both: for their product Simpson's rule is exact.
+                for ends in bends(points).windows(2) {
+                    let (middle, sixth) = (0.5 * (ends[0] + ends[1]), (ends[1] - ends[0]) / 6.0);
+                    for (nm, weight) in [(ends[0], sixth), (middle, 4.0 * sixth), (ends[1], sixth)] {
+                        add(nm, weight * self.density(nm));
+                    }
                 }
             }
         }
@@ -167,16 +160,9 @@ impl Wavelengths {
                 Self::lines(&nm.iter().zip(watts).map(|(&nm, w)| [nm, w * xyz_of_watt(nm)[1]]).collect::<Vec<_>>())
             }
             Kind::Continuous(points) => {
-                let [first, last] = observer_range();
-                let [a, b] = self.range_nm().map(|nm| nm.clamp(first, last));
-                let steps = (0..=(b - a).ceil() as usize).map(|k| (a + k as f64).min(b));
                 // Between its own points the spectrum is linear: with these and every nanometre the product is followed closely.
-                let own = points.iter().map(|p| p[0]).filter(|nm| (a..=b).contains(nm));
-                let mut nm: Vec<f64> = steps.chain(own).collect();
-                nm.sort_by(f64::total_cmp);
-                nm.dedup();
                 let lumens = |nm: f64| (nm, self.density(nm) * xyz_of_watt(nm)[1]);
-                Self::continuous(Table::new("spectrum", nm.into_iter().map(lumens))?)
+                Self::continuous(Table::new("spectrum", bends(points).into_iter().map(lumens))?)
             }
         }
     }
@@ -185,4 +171,17 @@ impl Wavelengths {
     pub fn efficacy(&self) -> f64 {
         self.xyz()[1]
     }
+}
+
+/// Returns, rising, the wavelengths, nm, between which a table of wavelength and power, and what the eye sees, are both linear: its
+/// own points and every whole nanometre, as far as table and observer reach; none where they have no wavelength in common.
+fn bends(points: &[[f64; 2]]) -> Vec<f64> {
+    let [first, last] = observer_range();
+    let seen = points[0][0].max(first)..=points[points.len() - 1][0].min(last);
+    let whole = (first as u32..=last as u32).map(f64::from);
+    let own = points.iter().map(|p| p[0]);
+    let mut nm: Vec<f64> = whole.chain(own).filter(|nm| seen.contains(nm)).collect();
+    nm.sort_by(f64::total_cmp);
+    nm.dedup();
+    nm
 }
