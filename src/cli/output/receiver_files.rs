@@ -98,9 +98,13 @@ fn write_grid(
 }
 
 /// Writes the sampled rays of a plane or disc; returns the names of the files.
-fn write_rays(folder: &Path, receiver: &ReceiverResult, sample: SampledRays) -> Result<Vec<String>, Failure> {
+fn write_rays(folder: &Path, receiver: &ReceiverResult, mut sample: SampledRays) -> Result<Vec<String>, Failure> {
     let stem = file_stem(&receiver.name);
     let mut names = Vec::new();
+    let total: f64 = sample.rays.iter().map(|ray| ray.power).sum();
+    // A sample has its own chance: its rays are to carry what the receiver counted, which all rays of the run found.
+    let share = if total > 0.0 { receiver.power / total } else { 1.0 };
+    sample.rays.iter_mut().for_each(|ray| ray.power *= share);
     if matches!(receiver.kind, "plane" | "disc") {
         names.push(format!("{stem}.tm25ray"));
         write_tm25(&folder.join(format!("{stem}.tm25ray")), &sampled_rays(receiver, &sample))?;
@@ -129,15 +133,10 @@ pub(crate) fn names(receiver: &Receiver) -> Vec<String> {
     common.iter().chain(own).map(|ending| format!("{stem}{ending}")).collect()
 }
 
-/// Makes a TM-25 file of the sampled rays of a plane or disc, their powers scaled to carry what the receiver counted in all.
+/// Makes a TM-25 file of the sampled rays of a plane or disc, whose powers are scaled already.
 fn sampled_rays(receiver: &ReceiverResult, sample: &SampledRays) -> Tm25 {
-    let rays = &sample.rays;
     let flux = if receiver.unit == "lx" { Flux::Luminous } else { Flux::Radiant };
-    let total: f64 = rays.iter().map(|ray| ray.power).sum();
-    // A sample has its own chance: its rays are to carry what the receiver counted, which all rays of the run found.
-    let share = if total > 0.0 { receiver.power / total } else { 1.0 };
-    let rays: Vec<LightRay> = rays.iter().map(|ray| LightRay { power: ray.power * share, ..*ray }).collect();
-    let mut file = Tm25::from_rays(&rays, flux);
+    let mut file = Tm25::from_rays(&sample.rays, flux);
     if let Some(nm) = sample.wavelength_nm {
         // One for all: the columns of the rays have none then.
         file.header.spectral = SpectralData::Single;
