@@ -52,11 +52,12 @@ impl SceneResults {
     }
 
     /// Returns the errors of a receiver's cells from the facets, in its unit, with what rarer rays than those that compared may change of
-    /// each; zeros on the spline, `None` where they are not known, empty where there were too many cells to compare.
+    /// each, and with light that was lost; on the spline of lost light alone, `None` where they are not known, empty where there were too
+    /// many cells to compare.
     pub fn geometric_cells(&self, prepared: &PreparedScene, receiver: usize) -> Option<Vec<f64>> {
         // On the true surfaces the error is known, and it is none.
         let none = vec![0.0; self.results.receivers[receiver].cells.len()];
-        match (prepared.choice.intersector, &self.geometric) {
+        let of_facets = match (prepared.choice.intersector, &self.geometric) {
             (IntersectorKind::Exact, _) => Some(none),
             // Facets that are the surface itself were not compared cell by cell.
             (_, Some(error)) if error.rays == 0 => Some(none),
@@ -64,7 +65,23 @@ impl SceneResults {
                 let errors = &measured.as_ref()?.receivers.get(receiver)?.cells;
                 self.with_unseen_rays(receiver, errors, &self.results.receivers[receiver].cells)
             }
+        };
+        of_facets.map(|errors| self.with_lost_light(receiver, errors))
+    }
+
+    /// Adds to errors of a receiver's cells what lost light might have brought them: a share of their own, and, as it need not have
+    /// come where other light did, as much as each cell has of all of it where it is spread over the whole receiver.
+    fn with_lost_light(&self, receiver: usize, errors: Vec<f64>) -> Vec<f64> {
+        let (r, power) = (&self.results.receivers[receiver], &self.results.power);
+        if power.lost <= 0.0 {
+            return errors;
         }
+        // Off a disc there are no cells, and a ray adds nothing.
+        let is_on = |k: usize| r.ray_cells[k] > 0.0;
+        let whole: f64 = (0..r.cells.len()).filter(|&k| is_on(k)).map(|k| r.lit_measure(k)).sum();
+        let (share, even) = (power.lost / power.emitted, power.lost / whole);
+        let lost = |k: usize| if is_on(k) { even.hypot(share * r.cells[k]) } else { 0.0 };
+        errors.into_iter().enumerate().map(|(k, error)| error.hypot(lost(k))).collect()
     }
 
     /// Adds to errors of cells of a receiver what rays may change of them that are too rare to be among those that compared facets and
