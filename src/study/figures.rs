@@ -284,13 +284,18 @@ impl<'a> Errors<'a> {
         let max = max.filter(|_| self.measured.is_none_or(ReceiverError::has_cells));
         let length = if matches!(r.kind, "plane" | "disc") { "mm" } else { "deg" };
         let size = (0..2).filter(|&axis| r.has_place(axis)).map(|axis| r.rms[axis]).fold(0.0, f64::hypot);
+        // Light that was lost might have fallen anywhere on the receiver: so far, `off`, from where the other has its mean, or its width.
+        let lost_share = self.lost_power / (r.power + self.lost_power).max(f64::MIN_POSITIVE);
+        let lost = |axis: usize, off: f64| lost_share * (r.half[axis] / 3f64.sqrt()).hypot(off);
         let place =
-            |axis: usize, values: [f64; 2], errors: [f64; 2], paired: fn(&ReceiverError) -> &[Paired; 2]| {
-                let geometric = self.geometric(0.0, size, |m| paired(m)[axis].geometric());
+            |axis: usize, [values, errors]: [[f64; 2]; 2], off: f64, paired: fn(&ReceiverError) -> &[Paired; 2]| {
+                let geometric = self.geometric(lost(axis, off), size, |m| paired(m)[axis].geometric());
                 r.has_place(axis).then(|| Figure::new(values[axis], length, errors[axis], geometric))
             };
-        let rms = |axis: usize| place(axis, r.rms, r.rms_error, |m| &m.rms);
-        let centroid = |axis: usize| place(axis, r.centroid, r.centroid_error, |m| &m.centroid);
+        let rms = |axis: usize| place(axis, [r.rms, r.rms_error], r.rms[axis], |m| &m.rms);
+        let centroid = |axis: usize| {
+            place(axis, [r.centroid, r.centroid_error], r.centroid[axis] - r.middle[axis], |m| &m.centroid)
+        };
         let largest = if is_dark {
             largest_of(&r.ray_cells)
         } else {
