@@ -31,7 +31,9 @@ pub(crate) use near_points::NearPoints;
 pub use ray::{Departure, QuadHalf, Ray};
 pub use roots::{quadratic_roots, safe_newton};
 use serde::{Deserialize, Serialize};
-pub(crate) use spread::{error_of_mean, error_of_sum, variance_from_residuals, variance_of_sum};
+pub(crate) use spread::{
+    error_beside_unseen_ray, error_of_mean, error_of_sum, variance_from_residuals, variance_of_sum,
+};
 
 /// A position, mm.
 pub type Point = glam::DVec3;

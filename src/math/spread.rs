@@ -40,6 +40,24 @@ pub(crate) fn error_of_mean(parts: impl ExactSizeIterator<Item = [f64; 2]> + Clo
     parts.filter(|[value, _]| *value != 0.0).map(|[_, error]| error * error).sum::<f64>().sqrt() / count
 }
 
+/// Rays below which it is open whether heavier ones might have come: of none 6.6 are the limit at three standard errors.
+const FEW_RAYS: f64 = 7.0;
+/// Share of the heaviest ray's power below which those that came are of another kind.
+const LIGHT_RAY: f64 = 0.2;
+
+/// Returns the standard error of a power, given with that of its spread, to which the heaviest ray adds `ray`: that itself where no ray
+/// came, and beside the spread of a few much lighter ones, which tells nothing of heavy rays that did not come.
+pub(crate) fn error_beside_unseen_ray(power: f64, spread: f64, ray: f64) -> f64 {
+    if power <= 0.0 {
+        return ray;
+    }
+    // Independent rays spread by the root of their number.
+    let rays = (power / spread.max(f64::MIN_POSITIVE)).powi(2).max(1.0);
+    let is_light = power < LIGHT_RAY * ray * rays;
+    // Fading, so that the error does not jump where one ray more came.
+    if is_light && rays < FEW_RAYS { spread.hypot(ray * (1.0 - rays / FEW_RAYS)) } else { spread }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -54,6 +72,17 @@ mod tests {
             assert_eq!([error_of_sum(&parts), from_sums], [expected; 2], "{parts:?}");
         }
         assert_eq!([error_of_sum(&[]), variance_of_sum(0.0, 0.0, 0)], [0.0; 2]);
+    }
+
+    /// One ray of a twentieth of the heaviest: without any the error is the heaviest, and with ten it is their spread.
+    #[test]
+    fn a_light_ray_does_not_tell_that_no_heavy_one_comes() {
+        assert_eq!(error_beside_unseen_ray(0.0, 0.0, 1.0), 1.0);
+        assert!((0.8..1.0).contains(&error_beside_unseen_ray(0.05, 0.05, 1.0)));
+        assert_eq!(error_beside_unseen_ray(0.5, 0.158, 1.0), 0.158);
+        // One heavy ray is as uncertain as it is, and smooth light is known.
+        assert_eq!(error_beside_unseen_ray(1.0, 1.0, 1.0), 1.0);
+        assert_eq!(error_beside_unseen_ray(1e-6, 1e-12, 1.0), 1e-12);
     }
 
     /// Nine rays of weight 1 in nine of a hundred cells are 9 ± 3 rays in all; without any, one ray may have been missed.

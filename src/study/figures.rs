@@ -4,7 +4,7 @@
 //! is the limit of 95 % of what may be there (the rule of three: of n rays none arrives with probability e⁻³ where 3/n of them should).
 
 use super::geometric_error::{GeometricError, Paired, ReceiverError};
-use crate::math::error_of_maximum;
+use crate::math::{error_beside_unseen_ray, error_of_maximum};
 use crate::optics::{MAX_EFFICACY, observer_peaks};
 use crate::simulate::{ChannelResult, ReceiverResult, Results};
 use serde::Serialize;
@@ -255,7 +255,7 @@ impl<'a> Errors<'a> {
     fn figures(&self, r: &ReceiverResult, unit: &str) -> ReceiverFigures {
         let power = self.geometric(self.lost_power, self.unseen_power, |m| m.power.geometric_or(self.unseen_power));
         let is_dark = r.power <= 0.0;
-        let power = Figure::new(r.power, unit, if is_dark { r.ray_power } else { r.power_error }, power);
+        let power = Figure::new(r.power, unit, error_beside_unseen_ray(r.power, r.power_error, r.ray_power), power);
         let channels = self.channels(r, unit);
         // Absorbed power has neither cells nor places.
         if r.kind == "absorbed" {
