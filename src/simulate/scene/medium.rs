@@ -158,9 +158,12 @@ impl Medium {
             ];
             let formula = formulas.into_iter().find(|(_, is_given, _)| *is_given);
             let error = origin.error(ErrorKind::Value, &at(formula.map_or("name", |(key, ..)| key)), message);
+            // That of [run] is asked for also where all sources have spectra of their own, as in the infrared.
+            let elsewhere =
+                "where no light is of that wavelength, give `wavelength_nm` of [run] as one of the sources'";
             return Err(match formula {
-                Some((_, _, advice)) => error.help(advice),
-                None => error,
+                Some((_, _, advice)) => error.help(format!("{advice}; {elsewhere}")),
+                None => error.help(elsewhere),
             });
         }
         // Constants in nm² leave nearly nothing of each term, with the wrong sign: no light would be bent, in silence.
