@@ -203,3 +203,41 @@ fn chords_of_a_coarse_fillet_are_found() {
     }
     assert!(asked > 1000);
 }
+
+/// Chords of a cone beside its knot lines, near the tip, where a quarter of a turn is less than a micrometre to some millimetres wide: its
+/// own start is no hit, whichever side of the line it is told to lie on.
+#[test]
+fn chords_near_the_tip_of_a_cone_are_found() {
+    let (slope, height) = (30.0 / 80.0, 80.0);
+    let tip = Frame::from_axis(Point::new(0.0, 0.0, height), -Vector::Z, Some(Vector::X));
+    let surface = sweep::cone(&tip, 0.0, f64::atan(slope), [0.0, 2.0 * PI], [0.0, height]);
+    let exact = Exact::build(&model([surface.clone()]), &Settings::default());
+    let [[u0, u1], [v0, v1]] = surface.domain();
+    let mut s = Random(41);
+    let mut asked = 0;
+    for _ in 0..4000 {
+        let beside = 10f64.powf(s.within(-10.0, -7.0)) * if s.unit() < 0.5 { -1.0 } else { 1.0 };
+        let u = u0 + (u1 - u0) * (1.0 + (3.0 * s.unit()).floor()) / 4.0 + beside;
+        let uv = Uv::new(u, v0 + (v1 - v0) * 10f64.powf(s.within(-5.0, -1.0)));
+        let origin = surface.evaluate(uv);
+        let inward = Vector::new(-origin.x, -origin.y, -slope * slope * (height - origin.z)).normalize();
+        let along = inward.cross(s.direction()).normalize();
+        let sine = 10f64.powf(s.within(-2.0, -0.2));
+        let d = (along + sine * inward).normalize();
+        // On `x² + y² = slope² (height − z)²` the start is one root, and the other is linear over quadratic.
+        let fall = slope * slope * (height - origin.z);
+        let linear = origin.x * d.x + origin.y * d.y + fall * d.z;
+        let square = d.x * d.x + d.y * d.y - slope * slope * d.z * d.z;
+        let t = -2.0 * linear / square;
+        let end = origin.z + t * d.z;
+        if !(t > 1e-5 && (0.1..height - 1e-4).contains(&end)) {
+            continue;
+        }
+        asked += 1;
+        let from = Departure { face: FaceId(0), primitive: 0, uv, triangle: None };
+        let hit = exact.first(&Ray::new(origin, d).with_departure(from), &mut Cost::default()).hit;
+        // The start is rounded at 80 mm, and strays along the ray by that over both sines.
+        assert!(hit.is_some_and(|hit| (hit.t - t).abs() < 1e-9 * t + 1e-10), "{uv} {d}: {hit:?} for {t}");
+    }
+    assert!(asked > 1000, "{asked}");
+}

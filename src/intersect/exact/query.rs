@@ -17,6 +17,8 @@ const ORIGIN_ROUNDING: f64 = 64.0;
 const NEAR_DEPARTURE: f64 = 16.0;
 /// By how much the square of a direction's length may miss 1 and count as that: a thousand bounces round by as much.
 const UNIT_ROUNDING: f64 = 1e-12;
+/// Largest share of a patch by which a departure on its border may lie beyond it, however narrow it is.
+const LARGEST_BEYOND: f64 = 0.1;
 /// Share of a surface's domain within which parameters lie on its border, where seams and poles make one point of several: a
 /// micrometre on a metre.
 const BORDER: f64 = 1e-6;
@@ -201,13 +203,21 @@ impl DeparturePoint {
         }
         let mut local = geometry.patches[leaf.patch as usize].local(self.uv);
         if leaf.patch != self.patch {
-            if local.iter().any(|&x| !(-SAME_PARAMETER..=1.0 + SAME_PARAMETER).contains(&x)) {
+            let beyond = local.map(|x| (x - x.clamp(0.0, 1.0)).abs());
+            if !beyond.iter().all(|&x| x <= LARGEST_BEYOND) {
                 return None;
             }
             local = local.map(|x| x.clamp(0.0, 1.0));
-            // Beyond a crease the departure is no point of the patch: a ray that starts beside a wall meets it, however far ahead.
             let patch = &geometry.patches[leaf.patch as usize];
             let (border, du, dv) = project(&geometry.jet(patch, local));
+            // On a narrow patch a contact is a large share of it: beside a knot line near the tip of a cone, a root within one counts as
+            // on both sides of the line, and so does the departure.
+            let way = beyond[0] * du.length() + beyond[1] * dv.length();
+            let is_on_border = beyond.iter().all(|&x| x <= SAME_PARAMETER);
+            if !is_on_border && !(way <= self.contact + self.rounding + self.off) {
+                return None;
+            }
+            // Beyond a crease the departure is no point of the patch: a ray that starts beside a wall meets it, however far ahead.
             let beside = (origin - patch.center - border).dot(du.cross(dv).normalize_or_zero());
             if beside.abs() > self.tolerance + self.off {
                 return None;
