@@ -25,6 +25,8 @@ class Mesh:
     """
 
     def __init__(self, core: _lampyris.Mesh) -> None:
+        if not isinstance(core, _lampyris.Mesh):
+            raise TypeError("a Mesh is made by lampyris.Mesh.from_arrays(points, facets) or by tessellating a model, not by its name")
         self._core = core
 
     @classmethod

@@ -37,6 +37,8 @@ class Model:
     """Trimmed splines as a STEP file holds them, placed, in mm; made by :func:`read_step`."""
 
     def __init__(self, core: _lampyris.Model) -> None:
+        if not isinstance(core, _lampyris.Model):
+            raise TypeError("a Model is made by lampyris.read_step(path), not by its name")
         self._core = core
 
     @property

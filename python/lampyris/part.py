@@ -13,6 +13,8 @@ class Part:
     """What was traced of a run: to be kept, sent, added to other parts, and gone on from with ``trace(resume=part)``."""
 
     def __init__(self, core: _lampyris.Part) -> None:
+        if not isinstance(core, _lampyris.Part):
+            raise TypeError("a Part is what a run leaves, or lampyris.Part.from_bytes(data)")
         self._core = core
 
     @classmethod

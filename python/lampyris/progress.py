@@ -8,7 +8,7 @@ from typing import Any
 
 #: Called with the stage, what is done, the total (0 where it is not known) and messages; it stops the work by raising. What is done is
 #: counted in rays in the stages :data:`RAY_STAGES`, in thousandths of the work in others.
-ProgressCallback = Callable[[str, int, int, list[str]], None]
+ProgressCallback = Callable[[str, int, int, list[str]], object]
 
 #: Stages that count rays.
 RAY_STAGES = ("tracing", "checking")

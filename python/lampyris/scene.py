@@ -49,6 +49,7 @@ class Scene:
         self._tables: Table = {"run": plain({"unit": word("unit", unit), **run})}
         if word("title", title):
             self._tables["title"] = title
+        # What was read, until the tables are given out.
         self._text: str | None = None
         self._name = "scene"
         self._folder = os.getcwd()
@@ -148,9 +149,8 @@ class Scene:
 
     def to_toml(self) -> str:
         """The scene file: the very text that was read, or the tables."""
-        if self._text is None:
-            self._text = _lampyris.toml_from_json(table_to_json(self._tables))
-        return self._text
+        # Tables that were given out may change at any time: their text is made anew each time.
+        return _lampyris.toml_from_json(table_to_json(self._tables)) if self._text is None else self._text
 
     def save(self, path: Path) -> None:
         """Writes the scene file; what it names stands there by its absolute path, rays that came as an array in files beside it."""

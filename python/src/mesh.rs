@@ -1,8 +1,6 @@
 //! Meshes of quad facets as arrays.
 
-use crate::arrays::{
-    FARTHEST, columns, columns_of, flat, flat_uv, length, require_finite, rows, shaped, unit, vector,
-};
+use crate::arrays::{columns, columns_of, flat, flat_uv, length, require_finite, rows, shaped, unit, vector};
 use crate::errors::{SceneError, of_format, of_json};
 use crate::model::Model;
 use lampyris::FacetMesh;
@@ -240,6 +238,9 @@ fn flat_normal([a, b, c, d]: [Vector; 4]) -> Option<Vector> {
     flat.try_normalize()
 }
 
+/// Farthest corner of a mesh, mm: octree and BVH leave out facets that reach beyond. Rays may start farther away.
+const FARTHEST_CORNER: f64 = 1e12;
+
 /// The coordinates of points that a mesh may have.
 ///
 /// # Errors
@@ -247,9 +248,9 @@ fn flat_normal([a, b, c, d]: [Vector; 4]) -> Option<Vector> {
 fn checked_points<'a>(positions: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [f64]> {
     let points = rows(positions)?;
     require_finite(points, 3, "positions")?;
-    if let Some(k) = points.iter().position(|x| x.abs() > FARTHEST) {
+    if let Some(k) = points.iter().position(|x| x.abs() > FARTHEST_CORNER) {
         return Err(PyValueError::new_err(format!(
-            "positions[{}, {}] is {}: coordinates are mm, and at most {FARTHEST:e}; check the unit of length",
+            "positions[{}, {}] is {}: coordinates are mm, and at most {FARTHEST_CORNER:e}; check the unit of length",
             k / 3,
             k % 3,
             points[k]

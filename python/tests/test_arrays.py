@@ -145,7 +145,7 @@ def test_wrong_meshes_are_told_what_to_do() -> None:
     with pytest.raises(ValueError, match=r"the shape must be \(n, 3\) or \(n, 4\)"):
         lp.Mesh.from_arrays(CUBE, np.zeros((2, 5), dtype=int))
     with pytest.raises(ValueError, match="check the unit of length"):
-        lp.Mesh.from_arrays(1e16 * CUBE, SIDES)
+        lp.Mesh.from_arrays(1e13 * CUBE, SIDES)
     for take in (lp.Mesh.from_trimesh, lp.Mesh.from_pyvista):
         with pytest.raises(TypeError, match="arrays go to Mesh.from_arrays"):
             take(CUBE)

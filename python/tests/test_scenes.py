@@ -14,6 +14,36 @@ from conftest import LAMP, ROOT, lamp
 import lampyris as lp
 
 
+def test_tables_that_were_kept_go_on_to_count(tmp_path: pathlib.Path) -> None:
+    # A disc of radius 1 before a point that comes nearer: its share of all light is (1 - cos) / 2.
+    text = """[[source]]
+kind = "point"
+at = [0, 0, 0]
+[[receiver]]
+name = "disc"
+kind = "disc"
+at = [0, 0, 5]
+normal = [0, 0, 1]
+radius = 1
+"""
+    scene = lp.Scene.parse(text)
+    source = scene.tables["source"][0]
+    for height in (0.0, 2.0, 4.0):
+        source["at"] = [0, 0, height]
+        share = (1 - (5 - height) / np.hypot(5 - height, 1)) / 2
+        figure = scene.trace(rays=100_000, progress=False)["disc"].power
+        assert figure.value == pytest.approx(share, abs=5 * figure.statistical)
+
+
+def test_numbers_keep_every_bit_on_their_way_into_a_scene() -> None:
+    numbers = np.random.default_rng(7).uniform(-20, 20, (1000, 3))
+    scene = lp.Scene()
+    for at in numbers:
+        scene.tables.setdefault("source", []).append({"kind": "point", "at": at.tolist()})
+    written = [float(x) for line in scene.to_toml().splitlines() if line.startswith("at = [") for x in line[6:-1].split(",")]
+    assert written == numbers.ravel().tolist()
+
+
 def test_ten_lines_from_a_step_file_to_candela(tmp_path: pathlib.Path) -> None:
     scene = lamp()
     assert scene.facets().sag.max() <= 0.2
