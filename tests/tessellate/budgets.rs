@@ -1,9 +1,9 @@
 //! Faces that need more cells than they may have.
 
 use crate::support::trimmed::{chain, face};
-use lampyris::math::{Homogeneous, Uv};
-use lampyris::model::Model;
-use lampyris::nurbs::Surface;
+use lampyris::math::{Frame, Homogeneous, Uv};
+use lampyris::model::{Face, Model, Part, Shell};
+use lampyris::nurbs::{Surface, sweep};
 use lampyris::tessellate::{Repair, Settings, tessellate};
 use std::f64::consts::{PI, TAU};
 
@@ -34,6 +34,21 @@ fn a_face_whose_budget_ended_is_named() {
         named[usize::from(is_whole)] += 1;
     }
     assert!(named.into_iter().all(|count| count > 0), "{named:?}");
+}
+
+/// A ring of 5 m has the cells that the loosest default tolerance takes: halving makes 4.2 times what chords of the full sag would be.
+#[test]
+fn a_large_torus_is_held_to_the_default_tolerance() {
+    let ring = Face::whole(sweep::torus(&Frame::IDENTITY, 2000.0, 500.0, [0.0, TAU], [0.0, TAU]));
+    let shell = Shell { faces: vec![ring], closed: true, ..Shell::default() };
+    let model = Model::from_part(Part { shells: vec![shell], ..Part::default() });
+    let report = tessellate(&model, &Settings { measure: false, ..Settings::uniform(0.2) }).report;
+    assert!(
+        report.repaired.is_empty() && report.certified == report.facets,
+        "{} of {}",
+        report.certified,
+        report.facets
+    );
 }
 
 /// However small an angle is asked for: facets get the least that their number allows, and none stands upright where the budget would have

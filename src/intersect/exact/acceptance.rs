@@ -72,7 +72,22 @@ impl Exact {
         }
         let jet = net::evaluate(leaf.net(&self.geometry.nets), leaf.degree, local[0], local[1]);
         let (_, du, dv) = project(&jet);
-        let place = trim.locate(uv, seen_metric(query.d, leaf, patch, [du, dv]), face.flagging_distance);
+        let widths =
+            [0, 1].map(|k| (leaf.rect[k][1] - leaf.rect[k][0]) * (patch.domain[k][1] - patch.domain[k][0]));
+        self.side_near_trim(query, face, uv, ([du, dv], widths))
+    }
+
+    /// [`Self::trim_side`] where no cell decides: at parameters of a face whose `tangents` are derivatives by parameters that are scaled by
+    /// `widths`.
+    pub(super) fn side_near_trim(
+        &self,
+        query: &Query,
+        face: &FaceRecord,
+        uv: Uv,
+        ([du, dv], widths): ([Vector; 2], [f64; 2]),
+    ) -> (bool, bool) {
+        let trim = &self.geometry.trims[face.trim as usize];
+        let place = trim.locate(uv, seen_metric(query.d, [du, dv], widths), face.flagging_distance);
         let flagging = self.flagging_uses(face, trim, place.near);
         if flagging.is_empty() {
             return (place.inside, false);
