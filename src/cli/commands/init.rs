@@ -131,9 +131,16 @@ fn places_text(model: &Model) -> String {
 /// Sides of a box that differ by less than this share are equal: a round part fills its box to the rounding of its splines.
 const EQUAL_SIDES: f64 = 0.01;
 
-/// Returns the axis, 0 to 2, about which a box of these half sides is square, as that of a lens or a reflector is; z where no axis is alone
-/// in that.
+/// A box thinner than this share of its other sides is a flat sheet: a beam along it would meet nothing.
+const FLAT_SHARE: f64 = 1e-6;
+
+/// Returns the axis, 0 to 2, across a flat sheet that fills a box of these half sides, else that about which the box is square, as that of
+/// a lens or a reflector is; z where no axis is alone in that.
 fn optical_axis(half: [f64; 3]) -> usize {
+    let is_across = |k: &usize| half[*k] < FLAT_SHARE * half[(k + 1) % 3].min(half[(k + 2) % 3]);
+    if let Some(axis) = (0..3).find(is_across) {
+        return axis;
+    }
     let is_square = |k: &usize| {
         let [a, b] = [half[(k + 1) % 3], half[(k + 2) % 3]];
         (a - b).abs() < EQUAL_SIDES * a.max(b)
@@ -194,6 +201,12 @@ fn light_text(model: &Model) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_axis_is_that_across_a_flat_sheet() {
+        let halves = [[0.0, 5.0, 3.0], [5.0, 2e-15, 3.0], [5.0, 0.0, 5.0], [3.0, 3.0, 0.0], [0.0, 0.0, 3.0]];
+        assert_eq!(halves.map(optical_axis), [0, 1, 1, 2, 2]);
+    }
 
     #[test]
     fn the_axis_is_that_about_which_the_box_is_square() {
