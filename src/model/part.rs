@@ -32,7 +32,7 @@ pub struct Part {
 pub struct Shell {
     /// The faces, in the file's order.
     pub faces: Vec<Face>,
-    /// Whether the file says that the shell is closed (bounds a solid or a void).
+    /// Whether the shell is closed: it bounds a solid or a void, or the file calls it closed and it has no border.
     pub closed: bool,
     /// Whether it bounds a void of the solid whose shell comes before it.
     pub void: bool,

@@ -499,6 +499,8 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "face_edges",
             "swapped_vertices",
             "repeated_faces",
+            "shell_pieces",
+            "shells",
             "conversion",
             "pictures",
             "walk",

@@ -26,6 +26,7 @@ mod repeated_faces;
 mod revolved_conics;
 mod rims;
 mod seams;
+mod shell_pieces;
 mod shells;
 mod silence;
 mod subassemblies;

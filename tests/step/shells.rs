@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// Length of the side of a cube, mm.
-const SIDE: f64 = 10.0;
+pub(crate) const SIDE: f64 = 10.0;
 /// How far apart two vertices stand that the file joins by an edge of nothing, mm.
 const APART: f64 = 2e-5;
 
@@ -16,13 +16,18 @@ pub(crate) fn solid(corners: &[[f64; 3]], faces: &[&[usize]], senses: &[&str], t
     read(&solid_text(corners, faces, senses, tiny))
 }
 
-fn read(text: &str) -> Import {
+pub(crate) fn read(text: &str) -> Import {
     read_bytes("solid.stp", text.as_bytes(), &Settings::default()).expect("Part 21")
 }
 
 /// A solid with plane faces, given by the corners of each, counter-clockwise from outside. `senses` are the faces' flags; `tiny` is a pair
 /// of corners whose edge has a curve that leaves both at one parameter.
-fn solid_text(corners: &[[f64; 3]], faces: &[&[usize]], senses: &[&str], tiny: Option<[usize; 2]>) -> String {
+pub(crate) fn solid_text(
+    corners: &[[f64; 3]],
+    faces: &[&[usize]],
+    senses: &[&str],
+    tiny: Option<[usize; 2]>,
+) -> String {
     let mut data = String::new();
     let triple = |p: [f64; 3]| format!("({:?},{:?},{:?})", p[0], p[1], p[2]);
     let minus = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|i| a[i] - b[i]);

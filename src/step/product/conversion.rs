@@ -2,18 +2,17 @@
 
 use super::face_edges::{FaceEdges, face_edges};
 use super::free_surfaces::{Bounded, convert_free_surfaces, convert_trimmed_face, number_boundaries};
-use super::numbering::{ConvertedPart, add_face};
-use super::orientation::{faces_against_neighbours, is_inside_out, lies_outside};
+use super::numbering::{ConvertedPart, add_face, repair_note};
 use super::recipe_parts::convert_recipes;
-use super::repeated_faces::{RepeatedFace, remove_repeated_faces};
 use super::rims::align_rims;
+use super::shells::add_shells;
 use super::spikes::{EdgeTable, remove_spikes};
 use super::styles::Styles;
 use super::swapped_vertices::put_vertices_in_order;
 use super::topology::{EdgeKey, FacePlan, ShapeItems, number_edges, read_face};
 use super::zero_width::{joined_vertex, remove_faces_without_width, vertex_ids, vertices_of_empty_edges};
 use crate::math::Point;
-use crate::model::{Edge, EdgeId, Face, Part, Shell, VertexId};
+use crate::model::{Edge, EdgeId, Face, Part, VertexId};
 use crate::nurbs::{Curve, Surface};
 use crate::step::geometry::edges::{EdgeContext, TrimmedEdge};
 use crate::step::geometry::extent::FaceExtent;
@@ -116,11 +115,6 @@ pub(crate) fn convert(
     out
 }
 
-/// Names an instance of the file with a reason, for a repair.
-fn repair_note(file: &File<'_>, id: u64, reason: String) -> Refusal {
-    Refusal { id, entity: file.entity_name(id), reason }
-}
-
 /// Moves edges, and the vertices that they share, into the part. Returns the number of each key's edge there, `None` for edges that failed
 /// or have no length. Of the latter the two vertices become one, as `joined` says; those in `moved` are where it says.
 fn add_edges(
@@ -159,107 +153,6 @@ fn add_edges(
         part.edges.push(Edge { curve, vertices, entity });
     }
     numbers
-}
-
-/// Puts the faces into shells of the part; faces that contradict their neighbours, and shells of a solid that are inside out, are turned
-/// and listed as repaired, as are faces that stand where another one of their shell does. Shells without a face are left out.
-fn add_shells(
-    geometry: &GeometryReader<'_, '_>,
-    items: &ShapeItems,
-    mut faces: FxHashMap<u64, Face>,
-    styles: &Styles,
-    part: &mut Part,
-    out: &mut ConvertedPart,
-) {
-    let file = geometry.file;
-    // A face moves into the last shell that has it, and is copied into those before.
-    let mut left: FxHashMap<u64, usize> = FxHashMap::default();
-    items.shells.iter().flat_map(|s| &s.faces).for_each(|f| *left.entry(f.0).or_default() += 1);
-    // A void without the shell around it stands alone: which of the part's shells that is, and whether it has all its faces.
-    let mut outer: Option<(usize, bool)> = None;
-    // Behind the true voids, which belong to the shell before them.
-    let mut beside: Vec<Shell> = Vec::new();
-    let mut removed: FxHashSet<u64> = FxHashSet::default();
-    for plan in &items.shells {
-        let layer = plan.owners.iter().find_map(|o| styles.layer(*o));
-        let mut own: Vec<Face> = Vec::with_capacity(plan.faces.len());
-        for (id, flip) in &plan.faces {
-            let uses = left.entry(*id).or_default();
-            *uses = uses.saturating_sub(1);
-            let face = if *uses == 0 { faces.remove(id) } else { faces.get(id).cloned() };
-            let Some(mut face) = face else { continue };
-            face.reversed ^= flip;
-            face.layer = face.layer.or_else(|| layer.clone());
-            own.push(face);
-        }
-        let is_complete = own.len() == plan.faces.len();
-        if !plan.void {
-            part.shells.append(&mut beside);
-        }
-        removed.extend(mend_faces(geometry, &mut own, part, out));
-        let around = outer.filter(|_| plan.void);
-        // Below a dome that was refused a void is outside of what is left.
-        let lies_beside = around.is_some_and(|(k, is_whole)| is_whole && lies_outside(&own, &part.shells[k].faces));
-        let void = around.is_some() && !lies_beside;
-        if lies_beside {
-            // Of four pipes in a row, three of them voids of the first, light lost a fifth.
-            let reason = "a void lies outside of the shell that it is in: it is taken as a solid of its own";
-            out.repaired.extend(plan.owners.first().map(|owner| repair_note(file, *owner, reason.into())));
-        }
-        // Only a whole shell tells by its volume which way it faces.
-        let whole = plan.whole && is_complete;
-        if (plan.outer || around.is_some()) && whole && is_inside_out(&own, void) {
-            own.iter_mut().for_each(|face| face.reversed ^= true);
-            // Rays would enter where they should leave: one such file lost 857 of 50,000, one with a void 465 of 100,000.
-            let reason =
-                if void { "the shell of a void was inside out" } else { "the shell of a solid was inside out" };
-            out.repaired.extend(plan.owners.first().map(|owner| repair_note(file, *owner, reason.into())));
-        }
-        if !plan.void {
-            outer = (!own.is_empty()).then_some((part.shells.len(), whole));
-        }
-        if !own.is_empty() {
-            let shells = if lies_beside { &mut beside } else { &mut part.shells };
-            shells.push(Shell {
-                faces: own,
-                closed: plan.closed,
-                void,
-                colour: plan.owners.iter().find_map(|o| styles.colour(*o)),
-                name: plan.name.clone(),
-            });
-        }
-    }
-    part.shells.append(&mut beside);
-    // One that stands in another shell counts all the same.
-    let standing = part.shells.iter().flat_map(|shell| &shell.faces).filter_map(|face| face.entity);
-    for id in standing {
-        removed.remove(&id);
-    }
-    out.found = out.found.saturating_sub(removed.len());
-}
-
-/// Leaves out the faces of a shell that stand where others do, turns those that contradict their neighbours, and notes both in `out`.
-/// Returns the entities that it leaves out.
-fn mend_faces(
-    geometry: &GeometryReader<'_, '_>,
-    faces: &mut Vec<Face>,
-    part: &Part,
-    out: &mut ConvertedPart,
-) -> Vec<u64> {
-    let file = geometry.file;
-    let mut removed = Vec::new();
-    for RepeatedFace { id, standing } in remove_repeated_faces(faces, part, geometry.units) {
-        let (Some(id), Some(standing)) = (id, standing) else { continue };
-        let reason = format!("it stands where #{standing} does: it is left out");
-        out.repaired.push(repair_note(file, id, reason));
-        removed.push(id);
-    }
-    for k in faces_against_neighbours(faces) {
-        faces[k].reversed ^= true;
-        let reason = "its sense contradicts its edges, which run against those of its neighbours: the edges decide";
-        out.repaired.extend(faces[k].entity.map(|id| repair_note(file, id, reason.into())));
-    }
-    removed
 }
 
 /// Returns the curve of an edge, mm, or the line between two points of a loop; without one where it has no length.

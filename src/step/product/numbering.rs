@@ -3,6 +3,7 @@
 use super::styles::Styles;
 use crate::model::{Edge, EdgeId, Face, Part, VertexId};
 use crate::step::geometry::Refusal;
+use crate::step::part21::File;
 use crate::step::trim::face::{BuiltFace, trim_loops};
 use crate::step::trim::loops::Source;
 
@@ -23,6 +24,11 @@ pub(crate) struct ConvertedPart {
     pub(crate) refused: Vec<Refusal>,
     /// Faces that were repaired, and how.
     pub(crate) repaired: Vec<Refusal>,
+}
+
+/// Names an instance of the file with a reason, for a repair.
+pub(super) fn repair_note(file: &File<'_>, id: u64, reason: String) -> Refusal {
+    Refusal { id, entity: file.entity_name(id), reason }
 }
 
 /// Makes a face of a built one: adds its seams as edges, and vertices for their ends where none of the face is near, to the part. `numbers`

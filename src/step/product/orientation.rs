@@ -1,5 +1,5 @@
-//! Which way shells and their faces look: faces that contradict their neighbours, shells of solids that are inside out, and voids that are
-//! none.
+//! Which way shells and their faces look: faces that contradict their neighbours, shells of solids that are inside out, and which of them
+//! may be a void of which.
 //!
 //! Neighbours run along their common edge in opposite directions. A face whose flag of sense says otherwise is turned, if few do.
 //!
@@ -129,20 +129,50 @@ pub(crate) fn is_inside_out(faces: &[Face], void: bool) -> bool {
     -volume(&last) > 4.0 * off + last.area.length() * bounds(faces).diagonal() + ROUNDED * last.whole
 }
 
+/// Which way the faces of a closed shell look where that is certain: whether inwards.
+pub(super) fn looks_inwards(faces: &[Face]) -> Option<bool> {
+    if is_inside_out(faces, false) { Some(true) } else { is_inside_out(faces, true).then_some(false) }
+}
+
 /// Whether a void is none, as part of it certainly lies outside of the shell that is said to enclose it.
-pub(crate) fn lies_outside(void: &[Face], outer: &[Face]) -> bool {
-    // Surfaces lie within their boxes, and so does all that they enclose; trims may cut off much of one.
-    let enclosed = bounds(outer);
-    let enclosed = enclosed.grown(BOX_ROUNDING * enclosed.diagonal());
-    let corners = |face: &Face| {
-        let uses = face.loops.iter().flat_map(|l| &l.uses);
-        let mut corners: Vec<Uv> = uses.map(|u| u.start()).collect();
-        if corners.is_empty() {
-            corners.push(domain_center(face));
-        }
-        corners.into_iter().map(|uv| face.surface.evaluate(uv)).collect::<Vec<Point>>()
-    };
-    void.iter().flat_map(corners).any(|corner| corner.is_finite() && !enclosed.contains(corner))
+pub(super) fn lies_outside(void: &[Face], outer: &[Face]) -> bool {
+    !FaceBoxes::new(outer).may_enclose(&FaceBoxes::new(void))
+}
+
+/// Boxes of a shell: around all that its faces may enclose, and around what they certainly reach.
+pub(super) struct FaceBoxes {
+    enclosed: Aabb,
+    corners: Aabb,
+}
+
+impl FaceBoxes {
+    pub(super) fn new(faces: &[Face]) -> Self {
+        // Surfaces lie within their boxes, and so does all that they enclose; trims may cut off much of one.
+        let enclosed = bounds(faces);
+        let corners = faces.iter().flat_map(corners).filter(|corner| corner.is_finite());
+        Self { enclosed: enclosed.grown(BOX_ROUNDING * enclosed.diagonal()), corners: Aabb::from_points(corners) }
+    }
+
+    /// Whether the other shell may lie within this one: no corner of it is certainly outside.
+    pub(super) fn may_enclose(&self, other: &Self) -> bool {
+        let corners = other.corners;
+        corners.is_empty() || (self.enclosed.contains(corners.min) && self.enclosed.contains(corners.max))
+    }
+
+    /// Diagonal of the box around all that the faces may enclose, mm.
+    pub(super) fn diagonal(&self) -> f64 {
+        self.enclosed.diagonal()
+    }
+}
+
+/// Returns the points at which the edges of a face's loops begin; of a face without a border a point of it.
+fn corners(face: &Face) -> Vec<Point> {
+    let uses = face.loops.iter().flat_map(|l| &l.uses);
+    let mut corners: Vec<Uv> = uses.map(|u| u.start()).collect();
+    if corners.is_empty() {
+        corners.push(domain_center(face));
+    }
+    corners.into_iter().map(|uv| face.surface.evaluate(uv)).collect()
 }
 
 /// The box around the surfaces of faces, trimmed or not.
