@@ -4,6 +4,7 @@ use crate::support::{Shape, World};
 use lampyris::intersect::exact::{self, Exact};
 use lampyris::math::{Frame, Point, Vector};
 use lampyris::simulate::{Results, RunSettings, Scene, simulate};
+use std::path::Path;
 
 const LAYERS: [f64; 3] = [1.5, 1.7, 1.33];
 
@@ -293,4 +294,27 @@ fn light_that_leaves_by_an_opening_is_lost_and_not_absorbed_or_received() {
     open.shapes.remove(1);
     let inside = open.run(&text(&plane(5.0)), |_| ());
     assert!((inside.receivers[0].power - 0.96 * (-0.05f64).exp()).abs() < 1e-9, "{:?}", inside.power);
+}
+
+/// A film of 0.5 µm on a block is named, and how to keep its sides apart; a sheet below the block has but one side.
+#[test]
+fn the_thinnest_body_is_named_and_no_sheet() {
+    let mut world = World::default();
+    let flat = Shape::Rectangle { frame: Frame::IDENTITY, half: [1.0, 1.0] };
+    world
+        .cuboid("block", Point::new(-2.0, -2.0, 0.0), Point::new(2.0, 2.0, 1.0))
+        .cuboid("film", Point::new(-2.0, -2.0, 1.0), Point::new(2.0, 2.0, 1.0005))
+        .part("sheet", false, &[("face", flat)]);
+    let rule = |part: &str| format!("[[material]]\npart = '{part}'\nmedium = 'glass'\n");
+    let text = format!(
+        "[run]\nrays = 100\n[[medium]]\nname = 'glass'\nindex = 1.5\n{}{}{}[[source]]\nkind = 'point'\nat = [0, 0, 9]\n",
+        rule("block"),
+        rule("film"),
+        rule("sheet")
+    );
+    let scene = Scene::parse(&text, "film.toml", Path::new(".")).unwrap();
+    let bound = scene.bind(&world.model).unwrap();
+    let told: Vec<&String> = bound.notes().iter().filter(|note| note.contains("mm thick")).collect();
+    assert!(matches!(&told[..], [note] if note.starts_with("'film'")), "{told:?}");
+    assert!(told[0].ends_with("set glue_mm to 5e-5"), "{told:?}");
 }

@@ -21,6 +21,9 @@ const ROUNDING: f64 = 5e-7;
 /// Tables, media, sources and remarks on files that are named; of more the number is told.
 pub(super) const NAMED: usize = 8;
 
+/// Bodies thinner than this, mm, are flat sheets: a tenth of it is the least glue distance that a scene may have, which mends nothing then.
+const THINNEST_MM: f64 = 1e-8;
+
 /// Index beyond which the surroundings are no gas: vapours at normal pressure have up to 1.0018 (benzene).
 const MOST_OF_GAS: f64 = 1.002;
 
@@ -327,14 +330,14 @@ pub(super) fn ready_mesh_note(model: &Model) -> Option<String> {
     ))
 }
 
-/// Returns one sentence about the thinnest body that touches others and whose box is thinner than twice the glue distance along an axis;
-/// `None` where there is none.
+/// Returns one sentence about the thinnest body that touches others and whose box is thinner than twice the glue distance along an axis, no
+/// flat sheet; `None` where there is none.
 pub(super) fn thin_body_note(bound: &BoundScene) -> Option<String> {
     let glue = bound.scene.run.glue_mm;
     let thickness = |k: u32| bound.bodies[k as usize].bounds.size().min_element();
     let touching: BTreeSet<u32> = bound.faces.iter().filter(|f| f.touches_body).map(|f| f.body).collect();
     // Twice the glue: a body as thin as that has both of its faces within the glue of one place.
-    let thin = touching.into_iter().filter(|&k| k != AMBIENT && thickness(k) < 2.0 * glue);
+    let thin = touching.into_iter().filter(|&k| k != AMBIENT && (THINNEST_MM..2.0 * glue).contains(&thickness(k)));
     let film = thin.min_by(|a, b| thickness(*a).total_cmp(&thickness(*b)))?;
     let [name, medium] = bound.body_names(film)?;
     let thick = thickness(film);
