@@ -814,6 +814,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         "simulate/scene",
         &[
             "lenient",
+            "strict",
             "conditions",
             "locate",
             "origin",

@@ -103,6 +103,52 @@ fn lists_that_are_too_long_are_refused() {
     }
 }
 
+/// An empty list is no table without keys, which would be a Lambertian scatterer of all the light, and no list is a table by the order of
+/// its entries; a table is no name.
+#[test]
+fn lists_are_no_tables_and_tables_no_names() {
+    let material = |scatter: &str| format!("[[material]]\npart = 'x'\nsurface = 'mirror'\nscatter = {scatter}");
+    let lamp = |keys: &str| format!("[[source]]\n{keys}");
+    let names = "a table, expected one of point, cone, collimated";
+    for (head, words, line) in [
+        (material("[]"), "a list, expected a table; write it as in scatter = { lobe", 4),
+        (material("['lambertian', 0.5]"), "write it as in scatter = {", 4),
+        (material("[{ part = '*' }]"), "write it as in scatter = {", 4),
+        ("[[material]]\nsurface = 'mirror'\non = ['*']".into(), "write it as in on = {", 3),
+        ("run = [1000, 5]".into(), "write it as in [run]", 1),
+        ("accuracy = [[0, 0, 0]]".into(), "write it as in [accuracy]", 1),
+        ("medium = [['g', 1.5]]".into(), "write it as in [[medium]]", 1),
+        ("model = [['x.stp']]".into(), "write it as in [[model]]", 1),
+        ("[[model]]\nfile = 'x.stp'\nplacement = []".into(), "write it as in placement = {", 3),
+        ("[[model]]\nfile = 'x.stp'\nwithout = [['x']]".into(), "a list, expected a table; write a list of", 3),
+        (lamp("spectrum = ['d65']"), "write it as in spectrum = {", 2),
+        (lamp("kind = { point = {} }"), names, 2),
+        (lamp("kind = ['point']"), "a list, expected one of point, cone, collimated", 2),
+        (lamp("kind = 3"), "integer `3`, expected one of point, cone, collimated", 2),
+    ] {
+        let text = if head.contains("[[source]]") { head.clone() } else { format!("{head}\n{REST}") };
+        let e = Scene::parse(&text, "scene.toml", Path::new(".")).expect_err(&head);
+        let said = e.to_string();
+        assert!(said.contains(words), "{head}: {said}");
+        assert_eq!(e.line_and_column().map(|l| l.0), Some(line), "{head}: {said}");
+    }
+}
+
+/// The lists of a scene may be written as arrays of inline tables.
+#[test]
+fn lists_of_tables_may_stand_in_line() {
+    let text = "medium = [{ name = 'g', index = 1.5 }]\n\
+        material = [{ on = { part = 'x', at = [[0, 0, 1], [0, 0, 2]] }, medium = 'g', scatter = { share = 0.5 } }]\n\
+        model = [{ file = 'x.stp', without = [{ solid = [0, 'y'] }] }]\n\
+        run = { rays = 1e3 }\naccuracy = { tolerance_mm = 0.1 }\n\
+        source = [{ kind = 'collimated', spectrum = { kind = 'd65' } }]\nreceiver = [{ name = 'r', size = [1, 1] }]";
+    let scene = Scene::parse(text, "scene.toml", Path::new(".")).unwrap();
+    assert_eq!((scene.run.rays, scene.media.len(), scene.materials.len()), (1000, 1, 1));
+    assert_eq!(scene.materials[0].scatter.as_ref().and_then(|s| s.share), Some(0.5));
+    assert_eq!((scene.models[0].without.len(), scene.sources.len(), scene.receivers.len()), (1, 1, 1));
+    assert_eq!(scene.accuracy.tolerance_mm, Some([0.1, 0.1]));
+}
+
 /// Lumens of lumens are nothing, and no lumens come from light that the eye does not see.
 #[test]
 fn lumens_are_not_weighed_twice() {

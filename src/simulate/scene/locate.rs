@@ -173,6 +173,7 @@ fn type_error(message: &str, key: &str) -> Error {
     if let Some((form, example)) = TABLES.iter().find(|(form, _)| message.ends_with(&format!("expected {form}"))) {
         let what = if form.starts_with("struct") { "a table" } else { "a list" };
         let message = message.replace(form, what).replace("invalid type: map", "a single table");
+        let message = message.replace("invalid type: sequence", "a list");
         return Error::new(ErrorKind::Syntax, message).help(format!("write it as in {example}"));
     }
     for (form, plain) in [
@@ -212,7 +213,13 @@ fn plain_types(message: &str) -> String {
     if let Some((form, most)) = limit {
         return message.replace(form, &format!("expected a whole number from 0 to {most}"));
     }
-    PLAIN_TYPES.iter().fold(message.to_owned(), |m, (form, plain)| m.replace(form, plain))
+    let message = PLAIN_TYPES.iter().fold(message.to_owned(), |m, (form, plain)| m.replace(form, plain));
+    // Within a list that has a form of its own.
+    let message = match message.split_once("expected struct ") {
+        Some((before, _)) => format!("{before}expected a table"),
+        None => message,
+    };
+    message.replace("invalid type: map", "a table").replace("invalid type: sequence", "a list")
 }
 
 /// Returns the key whose value stands at byte `at` of the text, by its line; empty where there is none.

@@ -17,6 +17,7 @@ mod run;
 mod selector;
 mod source;
 mod spectrum;
+mod strict;
 mod surface;
 
 use super::{Error, ErrorKind};
@@ -39,6 +40,7 @@ use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use strict::Strict;
 
 /// A whole scene file.
 ///
@@ -129,8 +131,9 @@ impl Scene {
     /// For the first key that is not known, or value that cannot be, with its place in the text.
     pub fn parse(text: &str, file_name: &str, base_dir: &Path) -> Result<Self, Error> {
         let shared: Arc<str> = text.into();
-        let mut scene: Self =
-            toml::from_str(text).map_err(|e| locate::syntax_error(&e, file_name, &shared, &table_keys()))?;
+        let mut scene = toml::Deserializer::parse(text)
+            .and_then(|document| Self::deserialize(Strict(document)))
+            .map_err(|e| locate::syntax_error(&e, file_name, &shared, &table_keys()))?;
         scene.origin = Origin { file: file_name.into(), folder: base_dir.into(), text: Some(shared.clone()) };
         // Written out again, the scene shows what was understood: a list that lost entries on the way was too long.
         let understood = serde_json::to_value(&scene)
