@@ -17,6 +17,7 @@ mod ray;
 mod roots;
 pub(crate) mod simd;
 mod spread;
+mod threads;
 pub mod units;
 
 use bytemuck::{AnyBitPattern, NoUninit};
@@ -34,6 +35,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) use spread::{
     error_beside_unseen_ray, error_of_mean, error_of_sum, variance_from_residuals, variance_of_sum,
 };
+pub(crate) use threads::run_on_threads;
 
 /// A position, mm.
 pub type Point = glam::DVec3;

@@ -11,7 +11,7 @@ use super::outcome::{Event, PathVertex};
 use super::settings::RunSettings;
 use super::tallies::ReplicateTally;
 use crate::intersect::Intersector;
-use crate::math::{Point, Ray, Vector};
+use crate::math::{Point, Ray, Vector, run_on_threads};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -72,12 +72,7 @@ pub fn listed_ends(bound: &BoundScene, intersector: &dyn Intersector, settings: 
                 blocks.lock().unwrap_or_else(|e| e.into_inner()).push((first, block));
             }
         };
-        std::thread::scope(|scope| {
-            for _ in 1..settings.thread_count() {
-                scope.spawn(work);
-            }
-            work();
-        });
+        run_on_threads(settings.thread_count(), work);
         let mut blocks = blocks.into_inner().unwrap_or_else(|e| e.into_inner());
         // Blocks are done in any order.
         blocks.sort_by_key(|(first, _)| *first);

@@ -16,6 +16,7 @@ use super::sequence_recorder::SequenceRecorder;
 use super::settings::RunSettings;
 use super::tallies::ReplicateTally;
 use crate::intersect::{Cost, ExpectedRays, Intersector};
+use crate::math::run_on_threads;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::Instant;
@@ -87,16 +88,11 @@ pub fn trace(
         todo,
     };
     let gathering = Gathering::new(before, hooks, start);
-    std::thread::scope(|scope| {
-        // No more threads than replicates, and this one is among them.
-        for _ in 1..threads.min(work.todo.len()) {
-            scope.spawn(|| work.run(&gathering));
-        }
-        // This thread works too, so that one thread needs no other.
-        work.run(&gathering);
-    });
+    // No more threads than replicates, of which each takes one after the other: those that the system refuses leave none undone.
+    let wanted = threads.min(work.todo.len()).max(1);
+    let given = run_on_threads(wanted, || work.run(&gathering));
     let (partial, cost) = gathering.into_partial_run();
-    TracedRun { partial, cost, threads }
+    TracedRun { partial, cost, threads: if given < wanted { given } else { threads } }
 }
 
 /// Returns the contiguous part of `all` that shard number `shard`, from 0, of `shards` traces: the parts are disjoint and make up `all`.

@@ -311,6 +311,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "maximum",
             "near_points",
             "spread",
+            "threads",
             "units",
         ],
     ),

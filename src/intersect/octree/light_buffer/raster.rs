@@ -8,7 +8,7 @@ use super::buffer_facet::BufferFacet;
 use super::squares::{DIVIDED, DIVISIONS, Entry, LightBuffer, Square};
 use super::view::{PLANE_ROOM, View};
 use crate::intersect::facet::is_usable;
-use crate::math::Point;
+use crate::math::{Point, run_on_threads};
 use crate::mesh::FacetMesh;
 use rustc_hash::FxHashMap;
 use std::sync::OnceLock;
@@ -209,7 +209,7 @@ pub(super) fn draw(mesh: &FacetMesh, view: View, threads: usize) -> LightBuffer 
     buffer
 }
 
-/// The values of a function at 0 to `n − 1`, in order, worked out on `threads` threads, at least this one.
+/// The values of a function at 0 to `n − 1`, in order, worked out on `threads` threads, or as many as the system gives.
 fn in_parallel<T: Send + Sync>(n: usize, threads: usize, value: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let values: Vec<OnceLock<T>> = (0..n).map(|_| OnceLock::new()).collect();
     let next = AtomicUsize::new(0);
@@ -220,10 +220,7 @@ fn in_parallel<T: Send + Sync>(n: usize, threads: usize, value: impl Fn(usize) -
             place.get_or_init(|| value(k));
         }
     };
-    std::thread::scope(|scope| {
-        (1..threads).for_each(|_| drop(scope.spawn(work)));
-        work();
-    });
+    run_on_threads(threads, work);
     values.into_iter().filter_map(OnceLock::into_inner).collect()
 }
 
