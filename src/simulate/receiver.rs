@@ -62,6 +62,8 @@ pub(crate) enum Shape {
 pub(crate) struct FlatShape<'r> {
     pub(crate) frame: &'r Frame,
     pub(crate) half: [f64; 2],
+    /// Whether it is a disc.
+    pub(crate) is_round: bool,
     pub(crate) is_one_sided: bool,
 }
 
@@ -153,10 +155,10 @@ impl Receiver {
     pub(crate) fn flat(&self) -> Option<FlatShape<'_>> {
         match &self.shape {
             Shape::Plane { frame, half, one_sided } => {
-                Some(FlatShape { frame, half: *half, is_one_sided: *one_sided })
+                Some(FlatShape { frame, half: *half, is_round: false, is_one_sided: *one_sided })
             }
             Shape::Disc { frame, radius, one_sided, .. } => {
-                Some(FlatShape { frame, half: [*radius; 2], is_one_sided: *one_sided })
+                Some(FlatShape { frame, half: [*radius; 2], is_round: true, is_one_sided: *one_sided })
             }
             Shape::Sphere { .. } | Shape::FarField { .. } | Shape::Absorbed { .. } => None,
         }

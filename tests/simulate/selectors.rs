@@ -5,9 +5,11 @@ use crate::files::{corpus, read_model, step_files};
 use crate::support::{Shape, World};
 use lampyris::math::{Frame, Point, Vector};
 use lampyris::mesh::FacetMesh;
-use lampyris::model::{Analytic, Model, PlacedFace, TessellatedFace};
+use lampyris::model::{Analytic, EdgeUse, Model, PlacedFace, TessellatedFace, TrimLoop};
+use lampyris::nurbs::{ControlPoint, UvCurve, conic};
 use lampyris::simulate::{BoundScene, Error, RuleFaces, Scene, face_selectors};
 use std::collections::HashSet;
+use std::f64::consts::TAU;
 use std::path::Path;
 
 /// Two spheres of one part, each a solid of one face called NONE, as CAD systems write them; the second is larger and on a layer.
@@ -337,6 +339,44 @@ fn a_receiver_in_a_face_is_named() {
     assert!(notes("at = [1, 2, 3]\nnormal = [0, 0, -1]").contains("lies in"));
     for off in ["at = [1, 2, 3.001]", "at = [7, 2, 3]", "at = [1, 2, 3]\nnormal = [1, 0, 1]"] {
         assert_eq!(notes(off), "", "{off}");
+    }
+}
+
+/// A receiver that stands in an opening of a face, or fills it, as one in the port of an integrating sphere does, has none of the face in it;
+/// one that reaches over the rim has.
+#[test]
+fn a_receiver_in_an_opening_is_in_no_face() {
+    let mut world = World::default();
+    world.cuboid("plate", Point::new(-5.0, -5.0, 0.0), Point::new(5.0, 5.0, 3.0));
+    let mut model = world.model;
+    let top = &mut model.parts[0].shells[0].faces[5];
+    top.analytic = Analytic::Plane { frame: Frame::translation(Vector::Z * 3.0) };
+    // A hole of radius 2 about (1, 1).
+    let rim = conic::arc(&Frame::translation(Vector::new(1.0, 1.0, 0.0)), 2.0, [0.0, TAU]);
+    let points = rim.points.iter().map(|p| ControlPoint::weighted(p.position().truncate(), p.w)).collect();
+    let uv = UvCurve { degree: rim.degree, knots: rim.knots, points };
+    top.loops = vec![TrimLoop { uses: vec![EdgeUse { edge: None, reversed: true, uv }] }];
+    let notes = |receiver: &str| {
+        let text = format!("[[receiver]]\nname = 'r'\nabsorbs = false\n{receiver}\n");
+        bound(&model, &text).unwrap().notes().join("\n")
+    };
+    for free in [
+        "at = [1, 1, 3]\nkind = 'disc'\nradius = 1.9",
+        "at = [1, 1, 3]\nkind = 'disc'\nradius = 2",
+        "at = [2.2, 1.6, 3]\nkind = 'disc'\nradius = 0.5",
+        "at = [1, 1, 3]\nsize = [2.8, 2.8]",
+        "at = [6, 0, 3]\nsize = [2, 2]",
+    ] {
+        assert_eq!(notes(free), "", "{free}");
+    }
+    for flush in [
+        "at = [1, 1, 3]\nkind = 'disc'\nradius = 2.1",
+        "at = [3, 1, 3]\nkind = 'disc'\nradius = 0.5",
+        "at = [1, 1, 3]\nsize = [2.9, 2.9]",
+        "at = [-3, -3, 3]\nsize = [1, 1]",
+        "at = [0, 0, 3]\nsize = [12, 12]",
+    ] {
+        assert!(notes(flush).contains("'r' lies in face 5 of 'plate'"), "{flush}: {}", notes(flush));
     }
 }
 

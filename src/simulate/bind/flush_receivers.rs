@@ -2,11 +2,19 @@
 //! does so before it meets the face.
 
 use super::bound_scene::BoundScene;
+use crate::math::polygon::{is_inside_sides, nearest_on_side, polygon_sides};
 use crate::math::{Aabb, BoxTree, Point, Uv, Vector};
 use crate::model::{Analytic, Model, PlacedFace};
 use crate::simulate::body::AMBIENT;
 use crate::simulate::receiver::{FLUSH, FlatShape, NAMED_RECEIVERS, Receiver};
 use crate::text::{count_of, first_sentences};
+use std::cell::OnceCell;
+
+/// Share of a receiver's half side by which a face must reach into it: a receiver may fill an opening, whose round border is followed by
+/// chords, within a third of that.
+const LEAST_REACH: f64 = 1e-3;
+/// Pieces into which a span of a curved border is divided: of a circle of four spans the chords are beside it by 3e-4 of the radius.
+const SPAN_PIECES: usize = 32;
 
 /// Returns sentences about receivers that lie in a flat face of the model, each naming the first such face; of those that absorb, in a face
 /// that lets light out of a body. One for each of the first receivers, and one that counts the others.
@@ -21,11 +29,13 @@ pub(super) fn flush_receiver_notes(bound: &BoundScene, model: &Model) -> Vec<Str
     let mut flush: Vec<Option<PlacedFace<'_>>> = vec![None; flat.len()];
     let planes = model.placed_faces().filter_map(|face| Some((face, plane_of(&face)?)));
     for (face, plane) in planes {
+        let border = OnceCell::new();
         tree.any_meeting(&face.bounds(), |k| {
             let (receiver, shape) = &flat[k as usize];
             let first = &mut flush[k as usize];
             let matters = || !receiver.absorbs || stops_leaving(bound, shape, &face);
-            if first.is_none() && is_in_plane(&plane, shape) && matters() {
+            let reaches_in = || is_reached_by(border.get_or_init(|| placed_border(&face)), shape);
+            if first.is_none() && is_in_plane(&plane, shape) && matters() && reaches_in() {
                 *first = Some(face);
             }
             false
@@ -82,4 +92,55 @@ fn plane_of(face: &PlacedFace<'_>) -> Option<FacePlane> {
 fn is_in_plane(plane: &FacePlane, receiver: &FlatShape<'_>) -> bool {
     let height = receiver.frame.local_point(plane.origin).z;
     height.abs() <= receiver.near() && receiver.frame.z.cross(plane.normal).length() <= FLUSH
+}
+
+/// Returns the loops that bound a face as polygons, where it is placed, mm; none for a ready mesh.
+fn placed_border(face: &PlacedFace<'_>) -> Vec<Vec<Point>> {
+    let Some(spline) = face.face else { return Vec::new() };
+    let loops = spline.bounding_loops();
+    let whole = loops.is_empty().then(|| spline.domain_border());
+    let place = |uv: Uv| face.placement.point(spline.surface.evaluate(uv));
+    let polygons =
+        loops.iter().chain(&whole).map(|l| l.polygon(|s| if s.curve.degree == 1 { 1 } else { SPAN_PIECES }));
+    polygons.map(|polygon| polygon.into_iter().map(place).collect()).collect()
+}
+
+/// Whether some of a face in the plane of a receiver lies within it: not where the receiver stands in an opening of the face, beside it, or
+/// touches its border alone. `border` is the face's, as polygons.
+fn is_reached_by(border: &[Vec<Point>], receiver: &FlatShape<'_>) -> bool {
+    let FlatShape { frame, half, is_round, .. } = *receiver;
+    // In half sides, so that the receiver is the square from −1 to 1 or the circle within it.
+    let local = |p: &Point| {
+        let p = frame.local_point(*p);
+        Uv::new(p.x / half[0], p.y / half[1])
+    };
+    let polygons: Vec<Vec<Uv>> = border.iter().map(|polygon| polygon.iter().map(local).collect()).collect();
+    let mut sides = polygons.iter().flat_map(|polygon| polygon_sides(polygon));
+    // Where no border passes, all of the receiver is in the face or beside it, as its middle is.
+    is_inside_sides(sides.clone(), Uv::ZERO)
+        || sides.any(|side| if is_round { enters_disc(side) } else { enters_square(side) })
+}
+
+/// Whether a side reaches into the circle of radius 1 about 0.
+fn enters_disc(side: [Uv; 2]) -> bool {
+    nearest_on_side(side, Uv::ZERO).length() < 1.0 - LEAST_REACH
+}
+
+/// Whether a side reaches into the square from −1 to 1.
+fn enters_square([a, b]: [Uv; 2]) -> bool {
+    const HALF: f64 = 1.0 - LEAST_REACH;
+    let along = b - a;
+    let (mut first, mut last) = (0.0f64, 1.0f64);
+    for d in 0..2 {
+        if along[d] == 0.0 {
+            if a[d].abs() >= HALF {
+                return false;
+            }
+            continue;
+        }
+        let (low, high) = ((-HALF - a[d]) / along[d], (HALF - a[d]) / along[d]);
+        first = first.max(low.min(high));
+        last = last.min(low.max(high));
+    }
+    first < last
 }
