@@ -12,6 +12,8 @@ pub const INCH: f64 = 25.4;
 pub const DEGREE: f64 = PI / 180.0;
 /// Wavelengths that light may have, nm: from X-rays to a millimetre. What is meant in micrometres mostly lies below.
 pub const WAVELENGTHS_NM: std::ops::RangeInclusive<f64> = 1.0..=1e6;
+/// Coordinates that a place in a scene may have, mm: squares of distances, and products of these, are numbers.
+pub const PLACES_MM: std::ops::RangeInclusive<f64> = -1e30..=1e30;
 
 /// Factor of an SI prefix by its STEP name (`MILLI`, `MICRO`, …), in capitals; `None` for a name that is no prefix.
 pub fn si_prefix(name: &str) -> Option<f64> {

@@ -112,6 +112,9 @@ fn what_is_too_far_or_too_strong_is_refused() {
     assert!(far.contains("cannot be traced") && far.contains("collimated"), "{far}");
     let beyond = refusal("[[source]]\nkind = 'collimated'\nat = [0, 0, -1e300]\n");
     assert!(beyond.contains("farther away than numbers reach"), "{beyond}");
+    // Nothing is wrong with the source of a scene whose receiver lies beyond all reach.
+    let receiver = refusal("[[source]]\n[[receiver]]\nname = 'r'\nsize = [1, 1]\nat = [1e200, 0, 0]\n");
+    assert!(receiver.contains("test.toml:5:") && receiver.contains("`at` must lie within 1e30 mm"), "{receiver}");
     let model = refusal("[[model]]\nfile = 'a.stp'\nplacement = { at = [1e15, 0, 0] }\n[[source]]\n");
     assert!(model.contains("1e11 mm"), "{model}");
     let folder = tempfile::tempdir().unwrap();

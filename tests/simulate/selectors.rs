@@ -188,6 +188,8 @@ fn what_selects_nothing_is_refused_with_what_there_is() {
         ("solid = 5", "no part has a solid 5"),
         ("radius_mm = 1.5", "no face has a radius of 1.5 mm"),
         ("solid = 0\nradius_mm = 2", "matches no face"),
+        ("at = [nan, 0, 0]", "[NaN, 0.0, 0.0] is no point"),
+        ("at = [[0, 0, 1], [0, 1e200, 0]]", "[0.0, 1e200, 0.0] is no point"),
     ] {
         let error = rules(&twins(), &format!("[[material]]\n{selector}\nsurface = 'mirror'\n")).unwrap_err();
         assert!(error.to_string().contains(says), "{error}");

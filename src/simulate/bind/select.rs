@@ -2,6 +2,7 @@
 
 use super::nearest::Nearest;
 use crate::math::Point;
+use crate::math::units::PLACES_MM;
 use crate::model::{Instance, Model, PlacedFace, SurfaceKind};
 use crate::simulate::scene::{FaceSelector, Key, OneOrMany, Scene, SolidKey};
 use crate::simulate::{Error, ErrorKind};
@@ -189,6 +190,10 @@ pub(super) fn select_faces(
         return Err(scene.error(ErrorKind::NoMatch, base, message).help(help));
     }
     let Some(points) = &rule.at else { return Ok(candidates) };
+    if let Some(p) = points.as_slice().iter().find(|p| !p.iter().all(|x| PLACES_MM.contains(x))) {
+        let message = format!("{p:?} is no point: its coordinates must be numbers from -1e30 to 1e30, mm");
+        return Err(scene.error(ErrorKind::Value, &path("at"), message));
+    }
     let nearest = search.nearest.get_or_insert_with(|| Nearest::new(model));
     let bounds = nearest.bounds(&candidates);
     let mut chosen = Vec::new();

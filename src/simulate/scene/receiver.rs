@@ -1,7 +1,7 @@
 //! The key `[[receiver]]`: where light is counted.
 
 use super::{FaceSelector, Key, OneOrMany, Origin, PowerUnit};
-use crate::math::units::WAVELENGTHS_NM;
+use crate::math::units::{PLACES_MM, WAVELENGTHS_NM};
 use crate::simulate::{Error, ErrorKind};
 use serde::{Deserialize, Serialize};
 
@@ -261,6 +261,10 @@ impl Receiver {
         }
         if !self.at.iter().all(|x| x.is_finite()) {
             return fail("at", "`at` must be a point, of three finite numbers");
+        }
+        // Farther out distances are no numbers, and the sources would be said to lie too far away.
+        if !self.at.iter().all(|x| PLACES_MM.contains(x)) {
+            return fail("at", "`at` must lie within 1e30 mm of the origin");
         }
         for (key, direction) in [("normal", Some(self.normal)), ("up", self.up), ("x", self.x)] {
             if direction.is_some_and(|d| !d.iter().all(|x| x.is_finite()) || d == [0.0; 3]) {
