@@ -208,6 +208,27 @@ fn shards_merge_to_the_bits_of_one_run() {
     }
 }
 
+/// A file holds one shard: another is refused there, to be gone on with or not, and what the file holds stays.
+#[test]
+fn a_shard_does_not_go_into_the_file_of_another() {
+    let folder = lens(|m| m);
+    let path = folder.path();
+    let trace = |shard: &str, more: &[&str]| {
+        lampyris_in(path, &[&["trace", "scene.toml", "-o", "part.tally", "--shard", shard][..], more].concat())
+    };
+    assert_eq!(trace("2/3", &[]).0, 0);
+    let before = std::fs::read(path.join("part.tally")).unwrap();
+    let ways: [&[&str]; 2] = [&[], &["--resume"]];
+    for more in ways {
+        let (code, _, err) = trace("3/3", more);
+        let err = err.replace('\n', " ");
+        assert!(code == 2 && err.contains("it holds shard 2/3 of this run, finished"), "{more:?}: {code} {err}");
+        assert!(std::fs::read(path.join("part.tally")).unwrap() == before, "{more:?}");
+    }
+    let (code, _, err) = trace("2/3", &[]);
+    assert!(code == 0 && err.contains("traced already"), "{code} {err}");
+}
+
 /// A run that is killed goes on from where it was saved, to the bits of one that was not.
 #[test]
 fn a_killed_run_resumes_to_the_same_bits() {

@@ -350,6 +350,7 @@ fn trace_shard(
         shards::say_shard(&place.file, partial, shard, console)?;
         return Ok(lost_rays::report_light_lost_in_part(partial, prepared, command.extra.max_lost, console));
     }
+    from.as_ref().map_or(Ok(()), |saved| checkpoint.refuse_other_part(saved, &replicates, shard))?;
     if !command.extra.resume {
         refuse_overwriting(&place.file)?;
     }

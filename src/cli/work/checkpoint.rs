@@ -3,6 +3,7 @@
 use super::output_place::{folder_of, make_folder, rescue_folders};
 use super::part_sum::PartOrigins;
 use super::run_commands::RunCommands;
+use super::shards::is_shard_done;
 use super::tally_file::TallyHeader;
 use super::usage::Usage;
 use crate::cli::console::Console;
@@ -10,8 +11,9 @@ use crate::cli::failure::Failure;
 use crate::cli::machine;
 use crate::formats::{read_bytes, remove_stale, write_atomic};
 use crate::pipeline::{PreparedScene, RayRange, TracingSettings};
-use crate::simulate::PartialRun;
+use crate::simulate::{PartialRun, shard_replicates};
 use crate::text::grouped;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
@@ -128,6 +130,33 @@ impl<'a> Checkpoint<'a> {
             return Err(refuse(format!("it is of a run of {there} replicates, and this one has {asked}")));
         }
         Ok(Some(saved))
+    }
+
+    /// Refuses to add a shard (index from 0, count) of the replicates `all` to what is saved of the run, where that is another part of it.
+    ///
+    /// # Errors
+    /// With the part that is saved there, when it has nothing of the shard.
+    pub(crate) fn refuse_other_part(
+        &self,
+        saved: &PartialRun,
+        all: &Range<u32>,
+        shard: [u32; 2],
+    ) -> Result<(), Failure> {
+        let is_done = |r: u32| saved.done.binary_search(&r).is_ok();
+        if saved.done.is_empty() || shard_replicates(all.clone(), shard).any(is_done) {
+            return Ok(());
+        }
+        let other = self.place.earlier().as_ref().and_then(|header| header.shard).filter(|[_, count]| *count > 1);
+        let part = other.map_or_else(
+            || "other rays of this run".to_owned(),
+            |[index, count]| {
+                let is_whole = is_shard_done(saved, all.clone(), [index, count]);
+                let state = if is_whole { "finished" } else { "interrupted" };
+                format!("shard {}/{count} of this run, {state}", index + 1)
+            },
+        );
+        let failure = Failure::arguments(format!("{}: it holds {part}", self.place.file.display()));
+        Err(failure.with_help("give another place with -o, or remove the file"))
     }
 
     /// Returns the commands that the run is owed to: those of the file that was gone on from, as far as it is the same run.
