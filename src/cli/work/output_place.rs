@@ -34,7 +34,7 @@ impl OutputPlace {
     /// # Errors
     /// When the folder cannot be made or written, or another process writes into it.
     pub(crate) fn folder(folder: &Path) -> Result<Self, Failure> {
-        Self::claim(folder, folder.join(FOLDER_LOCK))
+        Self::claim(folder, folder, folder.join(FOLDER_LOCK))
     }
 
     /// Claims a single file, whose folder is made when missing; the file is not touched.
@@ -43,12 +43,12 @@ impl OutputPlace {
     /// As [`OutputPlace::folder`].
     pub(crate) fn file(path: &Path) -> Result<Self, Failure> {
         let name = file_name(path);
-        Self::claim(&folder_of(path), path.with_file_name(format!(".{name}.lock")))
+        Self::claim(path, &folder_of(path), path.with_file_name(format!(".{name}.lock")))
     }
 
-    /// Takes the lock file of a folder, which is made when missing, or says who has it. Where the file system has no locks, it takes it
-    /// unasked.
-    fn claim(folder: &Path, lock: PathBuf) -> Result<Self, Failure> {
+    /// Takes the lock file of a place in a folder, which is made when missing, or says who has it. Where the file system has no locks, it
+    /// takes it unasked.
+    fn claim(place: &Path, folder: &Path, lock: PathBuf) -> Result<Self, Failure> {
         make_folder(folder)?;
         let unwritable = |e: std::io::Error| unwritable(folder, &e);
         // The owner before may remove its lock file between opening and locking: then once more.
@@ -63,7 +63,7 @@ impl OutputPlace {
                 .map_err(unwritable)?;
             match file.try_lock() {
                 Ok(()) => {}
-                Err(TryLockError::WouldBlock) => return Err(owned_by_another(folder, &mut file)),
+                Err(TryLockError::WouldBlock) => return Err(owned_by_another(place, &mut file)),
                 // A file system without locks: nothing can be known of others.
                 Err(TryLockError::Error(_)) => {}
             }
@@ -85,7 +85,7 @@ impl Drop for OutputPlace {
 }
 
 /// Returns the failure that names the process that stands in the lock file.
-fn owned_by_another(folder: &Path, file: &mut File) -> Failure {
+fn owned_by_another(place: &Path, file: &mut File) -> Failure {
     let mut owner = String::new();
     let read = file.rewind().and_then(|()| file.take(LOCK_BYTES).read_to_string(&mut owner));
     // On a shared folder the number of a process says nothing without its machine.
@@ -93,8 +93,8 @@ fn owned_by_another(folder: &Path, file: &mut File) -> Failure {
         (Ok(_), Some((id, machine))) => format!(" (process {id} on {machine})"),
         _ => String::new(),
     };
-    Failure::running(format!("{}: another lampyris{process} is writing there", folder.display()))
-        .with_help("wait until it has ended, or give another folder with -o")
+    Failure::running(format!("{}: another lampyris{process} is writing there", place.display()))
+        .with_help("wait until it has ended, or give another place with -o")
 }
 
 /// Whether the open file is still the one of that name, and not one removed or replaced meanwhile.
@@ -284,6 +284,8 @@ mod tests {
         assert!(refused.contains(&owner), "{refused}");
         // Files in the folder are claimed apart: shards write beside one another.
         let shard = OutputPlace::file(&folder.join("1.tally")).unwrap();
+        let refused = OutputPlace::file(&folder.join("1.tally")).unwrap_err().to_string();
+        assert!(refused.contains("1.tally: another lampyris"), "{refused}");
         drop(OutputPlace::file(&folder.join("2.tally")).unwrap());
         drop((first, shard));
         assert_eq!(fs::read_dir(&folder).unwrap().count(), 0);
