@@ -143,7 +143,8 @@ impl PartSum {
                 header.commands.command, header.accuracy, first.accuracy
             )
         } else {
-            format!("it is part of another run ({}) than the first one", header.commands.command)
+            let difference = header.difference(first).map_or_else(String::new, |words| format!(": traced {words}"));
+            format!("it is part of another run ({}) than the first one{difference}", header.commands.command)
         })
     }
 
@@ -211,6 +212,25 @@ mod tests {
         assert!(refused.contains("traced by lampyris 0.0.1 0123456789ab, and this is lampyris "), "{refused}");
         assert!(sum.check(&traced(crate::pipeline::PROGRAM)).unwrap_err().contains("another run"));
         assert!(sum.check(&header()).is_ok());
+    }
+
+    #[test]
+    fn a_part_of_another_run_is_told_by_what_differs() {
+        let sum = PartSum::new(AskedRun { first: header(), fingerprint: "f".into(), scene: None, rays: None });
+        let refused = |seed: Option<u64>, rays: u64, scene: &str| {
+            let fields = serde_json::json!({"fingerprint": "other", "scene": scene, "part": [], "command": "c",
+                "program": crate::pipeline::PROGRAM, "seed": seed, "run_rays": rays});
+            sum.check(&serde_json::from_value(fields).unwrap()).unwrap_err()
+        };
+        for (seed, rays, scene, says) in [
+            (Some(9), 0, "s", ": traced with seed 9, the first part with the seed of its scene"),
+            (None, 1234, "t", ": traced with 1234 rays, the scene t, the first part with 0 rays, the scene s"),
+            // Both grow.
+            (None, 10_000, "s", "than the first one"),
+        ] {
+            let refused = refused(seed, rays, scene);
+            assert!(refused.ends_with(says), "{refused}");
+        }
     }
 
     #[test]

@@ -12,9 +12,10 @@ use crate::pipeline::{
     IntersectorChoice, IntersectorKind, MeshingSettings, PROGRAM, PartChoice, PreparedScene, RayRange,
     TracingSettings,
 };
-use crate::simulate::{Fingerprint, PartialRun};
+use crate::simulate::{Fingerprint, GROWING_REPLICATE, PartialRun};
 use crate::study::accuracy_target::{RelativeTolerance, TolerancePlan};
 use crate::study::default_accuracy::TracingChoice;
+use crate::text::grouped;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -151,6 +152,21 @@ impl TallyHeader {
             let version = if self.program.is_empty() { "of an earlier version" } else { self.program.as_str() };
             format!("by lampyris {version}, and this is lampyris {PROGRAM}")
         })
+    }
+
+    /// Returns in words what a part of another run differs in from the `first` one, of seed, rays and scene; `None` where these are alike.
+    pub(crate) fn difference(&self, first: &Self) -> Option<String> {
+        // The length of a run that grows tells it from no other.
+        let grow = [self, first].iter().all(|h| h.run_rays.is_multiple_of(GROWING_REPLICATE));
+        let words = |h: &Self| {
+            let seed = h.seed.map_or_else(|| "the seed of its scene".to_owned(), |seed| format!("seed {seed}"));
+            let rays = if grow { String::new() } else { format!("{} rays", grouped(h.run_rays)) };
+            [seed, rays, format!("the scene {}", h.scene().display())]
+        };
+        let (own, of_first) = (words(self), words(first));
+        let (own, of_first): (Vec<String>, Vec<String>) =
+            own.into_iter().zip(of_first).filter(|(own, of_first)| own != of_first).unzip();
+        (!own.is_empty()).then(|| format!("with {}, the first part with {}", own.join(", "), of_first.join(", ")))
     }
 
     /// Returns where the scene was when the part was traced.
