@@ -323,6 +323,7 @@ fn tables_over_micrometres_are_refused() {
     for (head, words, line) in [
         (medium("index_table = [[0.4, 1.5], [0.7, 1.51]]"), "a wavelength is 0.4, but must be from 1 to 1e6 nm", 3),
         (medium("index = 1.5\nabsorption_per_mm = [[0.4, 0.1], [0.7, 0.2]]"), "0.55 µm are 550 nm", 4),
+        (format!("{PLANE}bins_nm = [-180, 180]"), "`bins_nm` must begin at 0 nm or above", 4),
         (medium("cauchy = [1.5, 4200]"), "`[A, B, C, …]` with B in µm²", 3),
         (coating("reflectance = [[0, 0.4, 0.9], [0, 0.7, 0.8]]"), "in `reflectance`: a wavelength is 0.4", 4),
         (coating("coating = [[0, 0.55, 0.1, 0.8]]"), "in `coating`: a wavelength is 0.55", 4),

@@ -231,6 +231,9 @@ impl Receiver {
             if edges.len() < 2 || edges.len() > 1000 || !edges.windows(2).all(|w| w[0] < w[1]) {
                 return Some(("bins_nm", "`bins_nm` must be 2 to 1000 rising wavelengths"));
             }
+            if edges[0] < 0.0 {
+                return Some(("bins_nm", "`bins_nm` must begin at 0 nm or above"));
+            }
             // Light of the last bin ends there: edges in micrometres lie below all light.
             if edges.last().is_some_and(|last| !WAVELENGTHS_NM.contains(last)) {
                 return Some(("bins_nm", "`bins_nm` must end between 1 and 1e6 nm; 0.55 µm are 550 nm"));
