@@ -1,15 +1,19 @@
 //! The name that was probably meant.
 
+/// Letters of a word that are compared: no input makes the comparison long.
+const COMPARED: usize = 64;
+
 /// Returns the candidate nearest to a word, in any case of letters; `None` for no word, and where all differ in more than a third of the
-/// longer one's letters and one more.
+/// longer one's letters and one more, or in all of them.
 pub(crate) fn nearest_name<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let word = word.to_lowercase();
-    let longer = |c: &str| c.chars().count().max(word.chars().count());
+    let letters = |text: &str| text.chars().take(COMPARED).count();
+    let longer = |c: &str| letters(c).max(letters(&word));
     candidates
         .into_iter()
         .map(|c| (edit_distance(&word, &c.to_lowercase()), c))
         // A third of the letters, and one more for short words: what differs more is another word.
-        .filter(|(d, c)| !word.is_empty() && *d <= 1 + longer(c) / 3)
+        .filter(|(d, c)| !word.is_empty() && *d <= 1 + longer(c) / 3 && *d < longer(c))
         .min_by_key(|(d, _)| *d)
         .map(|(_, c)| c)
 }
@@ -39,10 +43,10 @@ pub(crate) fn nearest_or_listed<'a>(word: &str, names: impl IntoIterator<Item = 
     }
 }
 
-/// Returns the edit distance (Levenshtein 1966), which tells letters by their case. Quadratic; words are cut at 64 characters so that no
-/// input makes it long.
+/// Returns the edit distance (Levenshtein 1966), which tells letters by their case. Quadratic, so that words are cut at
+/// [`COMPARED`] letters.
 fn edit_distance(a: &str, b: &str) -> usize {
-    let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(64).collect(), b.chars().take(64).collect());
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(COMPARED).collect(), b.chars().take(COMPARED).collect());
     let mut row: Vec<usize> = (0..=b.len()).collect();
     for (i, x) in a.iter().enumerate() {
         let mut diagonal = std::mem::replace(&mut row[0], i + 1);
@@ -70,6 +74,10 @@ mod tests {
         assert_eq!(nearest_name("", ["A"]), None);
         assert_eq!(nearest_name("änäöü", ["äbcdü"]), None);
         assert_eq!(edit_distance("kitten", "sitting"), 3);
+        // However long, and not where no letter is the same.
+        assert_eq!(nearest_name(&"x".repeat(300), ["Open CASCADE STEP translator 7.8 2"]), None);
+        assert_eq!(nearest_name("g", ["1"]), None);
+        assert_eq!(nearest_name("G", ["g"]), Some("g"));
     }
 
     #[test]
