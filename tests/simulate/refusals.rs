@@ -347,6 +347,8 @@ fn refusals_say_what_would_be_right() {
     let lamp = |keys: &str| format!("[[source]]\n{keys}");
     for (head, words) in [
         (coat("scatter = { lobe = 'gaussian', sigma_deg = -1 }"), "`sigma_deg` is -1, but must be above 0"),
+        (coat("scatter = { lobe = 'gaussian', sigma_deg = 1e16 }"), "but must be above 0 and at most 180"),
+        ("[[medium]]\nname = 'g'\nsellmeier = []".into(), "`sellmeier` is empty: its rows are [B, C]"),
         (coat("surface = 'metal'\nmetal = [0.2, -3]"), "n above 0 and k 0 or more (n + i k)"),
         (
             lamp("spectrum = { kind = 'table', values = [[550, 1]] }"),

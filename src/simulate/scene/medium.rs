@@ -64,6 +64,10 @@ impl Medium {
     /// # Errors
     /// With the key that is wrong and what is wrong with it, as when there is not exactly one index.
     pub(crate) fn optics(&self) -> Result<optics::Medium, (&'static str, String)> {
+        // Without a row its index is that of vacuum: glass that bends nothing, in silence.
+        if self.sellmeier.as_ref().is_some_and(Vec::is_empty) {
+            return Err(("sellmeier", format!("`sellmeier` is empty: {SELLMEIER_ROWS}")));
+        }
         let points = |t: &[[f64; 2]]| t.iter().map(|p| (p[0], p[1])).collect::<Vec<_>>();
         let mut ways = Vec::new();
         ways.extend(self.index.map(Index::Constant));

@@ -8,6 +8,9 @@ use crate::simulate::{Error, ErrorKind};
 /// Sum of both parts of a complex index above which a slip of the decimal point is meant.
 const LARGEST_INDEX: f64 = 1e3;
 
+/// Largest standard deviation of a Gaussian lobe, degrees: half a turn, beyond which a slip of the decimal point is meant.
+const WIDEST_LOBE_DEG: f64 = 180.0;
+
 impl Material {
     /// Returns the surface as a coating and a scatter; bare where only a medium is given, and without any share for an absorber.
     ///
@@ -81,12 +84,12 @@ impl Material {
         let Some(s) = &self.scatter else { return Ok(None) };
         let lobe = match (s.lobe, s.sigma_deg, s.exponent, s.abg) {
             (LobeKind::Lambertian, None, None, None) => Lobe::Lambertian,
-            (LobeKind::Gaussian, Some(sigma), None, None) if sigma > 0.0 && sigma.is_finite() => {
+            (LobeKind::Gaussian, Some(sigma), None, None) if sigma > 0.0 && sigma <= WIDEST_LOBE_DEG => {
                 Lobe::Gaussian { sigma: sigma.to_radians() }
             }
             // In the unit in which it is written.
             (LobeKind::Gaussian, Some(sigma), None, None) => {
-                return Err(format!("`sigma_deg` is {sigma}, but must be above 0"));
+                return Err(format!("`sigma_deg` is {sigma}, but must be above 0 and at most {WIDEST_LOBE_DEG}"));
             }
             (LobeKind::Cosine, None, Some(exponent), None) => Lobe::Cosine { exponent },
             (LobeKind::Abg, None, None, Some([a, b, g])) => {
