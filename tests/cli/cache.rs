@@ -116,6 +116,8 @@ fn a_cache_is_shown_limited_and_cleared() {
     // Where nothing can be kept, the run goes on and says so.
     let (_, err) = traced(path, &["--cache", "model.stp"]);
     assert!(err.contains("nothing is kept"), "{err}");
+    let (code, _, err) = lampyris_in(path, &["cache", "--cache", "model.stp"]);
+    assert!(code == 3 && err.contains("model.stp: it is a file, and a folder is needed"), "{code} {err}");
 }
 
 /// Processes that start at once on an empty folder all end well, and leave whole entries behind.

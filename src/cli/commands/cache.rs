@@ -10,8 +10,8 @@ use crate::report::bytes;
 use crate::text::count_of;
 use serde_json::json;
 
-/// Prints what the folder of the cache holds, after emptying it if `clear`; fails where no cache is named, or the option names a folder
-/// that does not exist and is not to be emptied. The environment may name one that no run has needed yet: it is empty.
+/// Prints what the folder of the cache holds, after emptying it if `clear`; fails where no cache is named or it is a file, or the option
+/// names a folder that does not exist and is not to be emptied. The environment may name one that no run has needed yet: it is empty.
 pub(crate) fn run(option: &CacheOption, clear: bool, console: &Console) -> Result<Completion, Failure> {
     let Some(cache) = cache_folder::cache(option)? else {
         let failure = Failure::arguments("there is no cache: nothing is kept from one run to the next");
@@ -23,6 +23,10 @@ pub(crate) fn run(option: &CacheOption, clear: bool, console: &Console) -> Resul
         return Err(
             failure.with_help("check the path; a run with --cache makes the folder when it first keeps something")
         );
+    }
+    if cache.folder().is_file() {
+        let failure = Failure::input(format!("{}: it is a file, and a folder is needed", cache.folder().display()));
+        return Err(failure.with_help("give the folder in which runs keep their cache"));
     }
     let unreadable = |e: std::io::Error| Failure::running(format!("{}: {e}", cache.folder().display()));
     // Removed first: what is then listed is what is left.
