@@ -1,6 +1,7 @@
 //! Why optical data was refused.
 
 use crate::math::units::WAVELENGTHS_NM;
+use crate::text::typed_number;
 use thiserror::Error;
 
 /// Why optical data was refused; the message says what is wrong and what to give instead.
@@ -41,7 +42,7 @@ pub enum ErrorKind {
         expected: usize,
     },
     /// A number that means nothing.
-    #[error("{what} is {value}, but must be {allowed}")]
+    #[error("{what} is {}, but must be {allowed}", typed(.value))]
     OutOfRange {
         /// What the number is.
         what: &'static str,
@@ -82,6 +83,11 @@ impl From<ErrorKind> for Error {
     fn from(kind: ErrorKind) -> Self {
         Self { kind }
     }
+}
+
+/// Writes a number as it is typed.
+fn typed(value: &f64) -> String {
+    typed_number(*value)
 }
 
 /// Returns `value` when it is `good` and finite, else the refusal that names it and what is `allowed`.

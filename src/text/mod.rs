@@ -13,6 +13,7 @@ pub(crate) use natural_order::natural_order;
 pub(crate) use nearest_name::{did_you_mean, nearest_name, nearest_or_listed};
 #[cfg(feature = "report")]
 pub(crate) use number::NARROW_SPACE;
+pub(crate) use number::typed_number;
 pub use number::{count_of, figures, grouped};
 pub(crate) use sentence_list::first_sentences;
 #[cfg(feature = "cli")]

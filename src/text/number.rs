@@ -42,6 +42,14 @@ pub fn figures(value: f64, digits: usize) -> String {
     format!("{}{dot}{fraction}", in_thousands(whole)).replace('-', "−")
 }
 
+/// Writes a number as it is typed, with a power of ten where it would else have many zeros: `0.5`, `1e300`.
+pub(crate) fn typed_number(value: f64) -> String {
+    /// Sizes that are written with all their digits, but for 0.
+    const PLAIN: std::ops::Range<f64> = 1e-6..1e15;
+    let is_plain = value == 0.0 || !value.is_finite() || PLAIN.contains(&value.abs());
+    if is_plain { value.to_string() } else { format!("{value:e}") }
+}
+
 /// Writes a whole number with its thousands set apart by narrow spaces, from five digits on.
 pub fn grouped(value: u64) -> String {
     in_thousands(&value.to_string())

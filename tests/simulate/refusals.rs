@@ -347,7 +347,17 @@ fn refusals_say_what_would_be_right() {
     let lamp = |keys: &str| format!("[[source]]\n{keys}");
     for (head, words) in [
         (coat("scatter = { lobe = 'gaussian', sigma_deg = -1 }"), "`sigma_deg` is -1, but must be above 0"),
-        (coat("scatter = { lobe = 'gaussian', sigma_deg = 1e16 }"), "but must be above 0 and at most 180"),
+        (
+            coat("scatter = { lobe = 'gaussian', sigma_deg = 1e16 }"),
+            "`sigma_deg` is 1e16, but must be above 0 and at most 180",
+        ),
+        (coat("scatter = { share = -1e300 }"), "is -1e300, but must be"),
+        (format!("{PLANE}one_sided = 1e300"), "floating point `1e300`, expected a boolean"),
+        (
+            "[run]\nseed = 18446744073709551616".into(),
+            "the whole number 18446744073709551616 has more than 64 bits",
+        ),
+        (lamp("spectrum = { kind = 'black_body', kelvin = 1e-300 }"), "a black body of 1e-300 K has no light"),
         ("[[medium]]\nname = 'g'\nsellmeier = []".into(), "`sellmeier` is empty: its rows are [B, C]"),
         (coat("surface = 'metal'\nmetal = [0.2, -3]"), "n above 0 and k 0 or more (n + i k)"),
         (

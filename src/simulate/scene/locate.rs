@@ -150,7 +150,7 @@ const PLAIN_TYPES: [(&str, &str); 6] = [
 /// Makes the error for a message of the TOML reader that names no unknown key or variant, in words that do not speak of the program's
 /// own types, with an example where a list or table belongs; other messages stay. `key` is that of the value, empty where not known.
 fn type_error(message: &str, key: &str) -> Error {
-    let message = message.trim();
+    let message = &short_numbers(message.trim());
     // A list that is too short is of the right form.
     let lengths =
         message.strip_prefix("invalid length ").and_then(|m| m.split_once(", expected an array of length "));
@@ -220,6 +220,19 @@ fn plain_types(message: &str) -> String {
         None => message,
     };
     message.replace("invalid type: map", "a table").replace("invalid type: sequence", "a list")
+}
+
+/// Longest number that a message of the reader keeps: seventeen digits, a sign, a point and an exponent.
+const LONGEST_NUMBER: usize = 24;
+
+/// Returns a message of the reader with numbers of many digits, which it puts in backquotes, as they are typed: `1e300`.
+fn short_numbers(message: &str) -> String {
+    let pieces = message.split('`').enumerate().map(|(k, piece)| {
+        let is_long = k % 2 == 1 && piece.len() > LONGEST_NUMBER;
+        let number = piece.parse::<f64>().ok().filter(|_| is_long);
+        number.map_or_else(|| piece.to_owned(), text::typed_number)
+    });
+    pieces.collect::<Vec<String>>().join("`")
 }
 
 /// Returns the key whose value stands at byte `at` of the text, by its line; empty where there is none.

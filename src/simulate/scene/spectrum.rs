@@ -3,6 +3,7 @@
 use super::PowerUnit;
 use crate::optics::{ErrorKind, Spectrum, Table, Wavelengths, WhiteLed};
 use crate::simulate::wavelength_text::wavelength_range_text;
+use crate::text::typed_number;
 use serde::{Deserialize, Serialize};
 
 /// The spectrum of a source: `{ kind = … }` with the keys of that kind.
@@ -97,6 +98,7 @@ impl SpectrumKey {
         Err(match (&spectrum, fault.kind()) {
             (Spectrum::BlackBody { kelvin, range_nm }, ErrorKind::NoPower { .. }) => {
                 let range = wavelength_range_text(*range_nm);
+                let kelvin = typed_number(*kelvin);
                 format!("a black body of {kelvin} K has no light in {range}: give another `kelvin` or `range_nm`")
             }
             _ => fault.to_string(),

@@ -65,6 +65,12 @@ impl<'de, V: Visitor<'de>> Visitor<'de> for Strict<V> {
     fn visit_u64<E: Error>(self, value: u64) -> Result<V::Value, E> {
         self.0.visit_u64(value)
     }
+    fn visit_i128<E: Error>(self, value: i128) -> Result<V::Value, E> {
+        Err(E::custom(format_args!("the whole number {value} has more than 64 bits")))
+    }
+    fn visit_u128<E: Error>(self, value: u128) -> Result<V::Value, E> {
+        Err(E::custom(format_args!("the whole number {value} has more than 64 bits")))
+    }
     fn visit_f64<E: Error>(self, value: f64) -> Result<V::Value, E> {
         self.0.visit_f64(value)
     }

@@ -4,6 +4,7 @@ use super::{Key, LobeKind, Material, Medium, Origin, Reflectance, SurfaceOptics,
 use crate::optics::fresnel::PowerShares;
 use crate::optics::{Abg, Coating, CoatingTable, Lobe, Scatter, Split};
 use crate::simulate::{Error, ErrorKind};
+use crate::text::typed_number;
 
 /// Sum of both parts of a complex index above which a slip of the decimal point is meant.
 const LARGEST_INDEX: f64 = 1e3;
@@ -89,6 +90,7 @@ impl Material {
             }
             // In the unit in which it is written.
             (LobeKind::Gaussian, Some(sigma), None, None) => {
+                let sigma = typed_number(sigma);
                 return Err(format!("`sigma_deg` is {sigma}, but must be above 0 and at most {WIDEST_LOBE_DEG}"));
             }
             (LobeKind::Cosine, None, Some(exponent), None) => Lobe::Cosine { exponent },
