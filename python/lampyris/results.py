@@ -101,7 +101,11 @@ class Receiver:
     @cached_property
     def edges(self) -> tuple[FloatArray, FloatArray]:
         """Edges of the cells along both axes: mm of planes and discs, degrees of angles."""
-        return self._results.edges(self._index)
+        edges = self._results.edges(self._index)
+        # Kept for all who ask, as the cells are.
+        for along in edges:
+            along.setflags(write=False)
+        return edges
 
     @property
     def axes(self) -> tuple[FloatArray, FloatArray]:

@@ -78,10 +78,15 @@ impl Results {
         refused.into_iter().chain(bare).collect()
     }
 
-    /// The document of `results.json`, with the selector of each listed face.
-    fn document_json(&self) -> PyResult<String> {
+    /// The document of `results.json`, with the selector of each listed face, and without verdicts where a far field cannot be judged.
+    fn document_json(&self, py: Python<'_>) -> PyResult<String> {
         let mut document = self.found.document(&self.scene).map_err(of_json)?;
         self.add_selectors(&mut document);
+        // The figures stand without them: whoever asks for the verdicts alone is told why there are none.
+        let verdicts = py.detach(|| self.found.verdicts(&self.scene)).unwrap_or_default();
+        if !verdicts.is_empty() {
+            document["regulations"] = verdicts.iter().map(|v| v.assessment.document()).collect();
+        }
         serde_json::to_string(&document).map_err(of_json)
     }
 

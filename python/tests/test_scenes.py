@@ -153,7 +153,9 @@ def test_a_lamp_gets_its_verdict() -> None:
     assert verdict.verdict in verdict._repr_html_()
     assert run.verdicts == []
     scene.tables["regulation"] = [{"id": name, "receiver": "fine"}]
-    (own,) = scene.trace(intersector="octree", progress=False).verdicts
+    judged = scene.trace(intersector="octree", progress=False)
+    (own,) = judged.verdicts
+    assert judged.document["regulations"] == [own] and "regulations" not in run.document
     assert (own["regulation"], own.verdict, own.traffic) == (name, verdict.verdict, "right")
     assert [row["value"] for row in own["rows"]] == [row["value"] for row in verdict["rows"]]
     with pytest.raises(ValueError, match="name the far field"):
@@ -314,8 +316,9 @@ def test_further_channels_leave_a_run_readable(channels: Any) -> None:
     assert len(run) == 1 and "p" in repr(run["p"]) and len(run.to_frame()) > 0
     receiver = run["p"]
     assert list(receiver.channels) == list(receiver.channel_totals) and receiver.channels
-    with pytest.raises(ValueError, match="read-only"):
-        receiver.values[:] = 0.0
+    for shared in (receiver.values, *receiver.edges):
+        with pytest.raises(ValueError, match="read-only"):
+            shared[:] = 0.0
     for name, (cells, errors) in receiver.channels.items():
         assert cells.shape == errors.shape == (3, 4) and receiver.channel_totals[name].statistical is not None
 
