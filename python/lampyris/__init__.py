@@ -21,17 +21,17 @@ from .mesh import Mesh
 from .model import Account, Model, read_step
 from .part import Interrupted, Part
 from .receivers import ReceiverTable, absorbed, disc, far_field, plane, sphere
-from .results import Ends, Figure, Receiver, Run
+from .results import Ends, Figure, LostLightWarning, Receiver, Run
 from .scene import Scene, media, scene_schema
 from .sources import Source, collimated, cone, cosine, eulumdat, ies, lambertian, led, point, ray_file, rays
 from .tracers import Bvh, Exact, Octree
 from .verdicts import Assessment, regulations
 
 __all__ = [
-    "Account", "Assessment", "Bvh", "Defect", "Ends", "Exact", "Figure", "Hits", "InputError", "Interrupted", "Material",
-    "Mesh", "MissingFileError", "Model", "Octree", "Part", "Receiver", "ReceiverTable", "Run", "Scene", "SceneError", "Selector",
-    "Source", "__version__", "absorbed", "absorber", "coating", "collimated", "cone", "cosine", "diffuse",
-    "disc", "eulumdat", "far_field", "glass", "ies", "interface", "lambertian", "led", "media", "metal", "mirror", "plane",
-    "point", "ray_file", "rays", "read_step", "regulations", "scene_schema", "select", "sphere", "study",
-    "write_demo",
+    "Account", "Assessment", "Bvh", "Defect", "Ends", "Exact", "Figure", "Hits", "InputError", "Interrupted",
+    "LostLightWarning", "Material", "Mesh", "MissingFileError", "Model", "Octree", "Part", "Receiver", "ReceiverTable",
+    "Run", "Scene", "SceneError", "Selector", "Source", "__version__", "absorbed", "absorber", "coating", "collimated",
+    "cone", "cosine", "diffuse", "disc", "eulumdat", "far_field", "glass", "ies", "interface", "lambertian", "led", "media",
+    "metal", "mirror", "plane", "point", "ray_file", "rays", "read_step", "regulations", "scene_schema", "select", "sphere",
+    "study", "write_demo",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from typing import Any
 
 from . import _html, _lampyris
@@ -112,12 +113,16 @@ class Model:
 def read_step(path: Path, unit_mm: float | None = None) -> Model:
     """Reads a STEP file; a face that cannot be converted is refused with a reason and stops nothing.
 
-    ``unit_mm`` overrules the file's unit of length. Raises :class:`InputError` when the file cannot be read or is not STEP.
+    ``unit_mm`` overrules the file's unit of length. What could not be read, such as the end of a file that was cut off, is told by warnings.
+    Raises :class:`InputError` when the file cannot be read or is not STEP.
     """
     unit = None if unit_mm is None else real_number("unit_mm", unit_mm)
     if unit is not None and not SMALLEST_UNIT_MM <= unit <= LARGEST_UNIT_MM:
         raise _lampyris.SceneError(f"unit_mm = {unit}: it must be from {SMALLEST_UNIT_MM} to {LARGEST_UNIT_MM} mm, as 25.4 for inches")
-    return Model(_lampyris.read_step(existing_file(path), unit))
+    model = _lampyris.read_step(existing_file(path), unit)
+    for sentence in model.reading_notes():
+        warnings.warn(sentence, stacklevel=2)
+    return Model(model)
 
 
 def _read_again(path: str, unit_mm: float | None, known_hash: str) -> Model:

@@ -278,8 +278,8 @@ class Run(Mapping[str, Receiver]):
 
     @property
     def notes(self) -> list[str]:
-        """What a reader must know, faces that were refused or have no facets first."""
-        return [*self._results.missing_faces(), *self.document["notes"]]
+        """What a reader must know, first what the models lack: faces that were refused or have no facets, and what could not be read."""
+        return [*self._results.model_notes(), *self.document["notes"]]
 
     @property
     def chosen(self) -> dict[str, Any] | None:
@@ -397,3 +397,15 @@ class Run(Mapping[str, Receiver]):
         ]
         power = _html.table(("power", "value", "± rays", "± facets", "unit"), rows)
         return power + "".join(receiver._repr_html_() for receiver in self.values())
+
+
+class LostLightWarning(UserWarning):
+    """More light was lost than a sound scene loses; a filter of warnings that raises it leaves the results in ``run``."""
+
+    def __init__(self, sentence: str, run: Run) -> None:
+        super().__init__(sentence)
+        #: The results.
+        self.run = run
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return LostLightWarning, (str(self), self.run)

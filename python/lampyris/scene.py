@@ -21,7 +21,7 @@ from .model import Model
 from .part import Interrupted, Part, part_bytes, part_core
 from .progress import ProgressCallback, callback
 from .receivers import ReceiverTable
-from .results import Ends, Run
+from .results import Ends, LostLightWarning, Run
 from .settings import Settings, trace_settings, whole_number, word
 from .sources import Source
 
@@ -169,12 +169,19 @@ class Scene:
 
     def prepare(self, *, progress: bool | ProgressCallback = True, **settings: Any) -> Settings:
         """Reads, binds and facets the scene, and chooses how to trace it; says how. ``settings`` are those of :meth:`trace`."""
-        prepared = self._prepare(trace_settings(settings), progress)
+        prepared = self._prepare_and_warn(trace_settings(settings), progress)
         return dict(json.loads(prepared.summary_json()))
 
     def facets(self, **settings: Any) -> Mesh:
         """The facets that a trace with these settings is about; on the spline those that it is drawn and checked with."""
-        return Mesh(self._prepare(trace_settings(settings), False).mesh)
+        return Mesh(self._prepare_and_warn(trace_settings(settings), False).mesh)
+
+    def _prepare_and_warn(self, settings: Settings, progress: bool | ProgressCallback) -> _lampyris.Prepared:
+        """Prepares, and warns the caller of a method of what the models lack: before a trace, which a filter that raises would throw away."""
+        prepared = self._prepare(settings, progress)
+        for sentence in prepared.model_notes():
+            warnings.warn(sentence, stacklevel=3)
+        return prepared
 
     def _prepare(self, settings: Settings, progress: bool | ProgressCallback) -> _lampyris.Prepared:
         text = self.to_toml()
@@ -244,7 +251,7 @@ class Scene:
         until = None if until is None else word("until", until)
         part = self._part_to_resume(resume, rays if until is None else None)
         core = None if part is None else part._core
-        prepared = self._prepare(settings, progress)
+        prepared = self._prepare_and_warn(settings, progress)
         tell, close = callback(progress)
         words = None
         try:
@@ -260,9 +267,11 @@ class Scene:
         if found is None:
             raise _lampyris.Defect("a trace ended without results; please report it")
         self.interrupted = None
-        for sentence in found.missing_faces():
-            warnings.warn(sentence, stacklevel=2)
-        return Run(found, None if words is None else json.loads(words))
+        run = Run(found, None if words is None else json.loads(words))
+        lost = found.lost_light()
+        if lost is not None:
+            warnings.warn(LostLightWarning(lost, run), stacklevel=2)
+        return run
 
     def _part_to_resume(self, resume: bool | Part, rays: int | None) -> Part | None:
         """What is to be gone on from: the part that was left for ``True``, none for ``False``; it must be of a run of so many rays."""
@@ -282,7 +291,7 @@ class Scene:
 
         ``settings`` are those of :meth:`trace`.
         """
-        prepared = self._prepare(trace_settings(settings), progress)
+        prepared = self._prepare_and_warn(trace_settings(settings), progress)
         tell, close = callback(progress)
         try:
             return Ends(*prepared.ends(tell))
@@ -297,6 +306,7 @@ class Scene:
         Ctrl-C raises :class:`Interrupted` with what was done of the part.
         """
         place = (whole_number("index", index, 0, MOST_PARTS), whole_number("count", count, 1, MOST_PARTS))
+        self._prepare_and_warn(trace_settings(settings), progress)
         return self._trace_part(place, [], progress, settings)
 
     def _trace_part(

@@ -40,7 +40,7 @@ class StoredResults(StoredCells):
         self._document = results.document_json()
         super().__init__(results, dict(enumerate(json.loads(self._document)["receivers"])))
         self.digest = results.digest
-        self._missing_faces = results.missing_faces()
+        self._model_notes = results.model_notes()
         self._paths = results.paths()
         self._verdicts: str | _lampyris.SceneError
         try:
@@ -52,9 +52,9 @@ class StoredResults(StoredCells):
         """The document of ``results.json``."""
         return self._document
 
-    def missing_faces(self) -> list[str]:
-        """Sentences on faces of the model that are not in the run."""
-        return self._missing_faces
+    def model_notes(self) -> list[str]:
+        """Sentences on what the models of the scene lack."""
+        return self._model_notes
 
     def verdicts_json(self) -> str:
         """The verdicts of the scene's regulations."""

@@ -3,6 +3,7 @@
 //! What is pleasant to use (scenes, results, pictures, Dask) is written in Python on top of it, in `lampyris/`. Guarantee: no input
 //! aborts the interpreter; work runs without the GIL on threads of its own, and Ctrl-C ends it.
 
+mod accounts;
 mod arrays;
 mod background;
 mod errors;

@@ -1,5 +1,6 @@
 //! Models from STEP files.
 
+use crate::accounts::reading_notes;
 use crate::background::interruptible;
 use crate::errors::{InputError, SceneError, of_json, of_pipeline, of_step};
 use crate::mesh::Mesh;
@@ -80,6 +81,11 @@ impl Model {
     /// What the file holds and what was refused, as JSON.
     fn account_json(&self) -> PyResult<String> {
         serde_json::to_string(&self.import.report).map_err(of_json)
+    }
+
+    /// Sentences on what could not be read of the file.
+    fn reading_notes(&self) -> Vec<String> {
+        reading_notes(std::slice::from_ref(&self.import.report))
     }
 
     /// Parts, solids and faces, as JSON.

@@ -1,5 +1,6 @@
 //! Scenes that are bound, faceted and ready to be traced.
 
+use crate::accounts::model_notes;
 use crate::arrays::{flat, shaped};
 use crate::background::{Outcome, interruptible};
 use crate::errors::{of_json, of_pipeline, of_scene};
@@ -261,6 +262,11 @@ impl Prepared {
     #[getter]
     fn mesh(&self) -> Mesh {
         Mesh::of_scene(self.scene.facets.whole().into_owned())
+    }
+
+    /// Sentences on what the models of the scene lack.
+    fn model_notes(&self) -> Vec<String> {
+        model_notes(&self.scene)
     }
 
     /// How it is traced and why, what is in the scene, as JSON.

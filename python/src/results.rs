@@ -1,5 +1,6 @@
 //! Results as arrays, and their verdicts.
 
+use crate::accounts::model_notes;
 use crate::arrays::{columns, flat, rows, shaped};
 use crate::errors::{SceneError, of_json};
 use lampyris::formats::{Axis, ColourMap, Grid, Picture};
@@ -8,12 +9,16 @@ use lampyris::regulation::Regulation;
 use lampyris::simulate::scene::{FarFieldType, RegulationUse};
 use lampyris::simulate::{ReceiverResult, face_selectors};
 use lampyris::study::figures::{cell_errors, channel_cell_errors};
+use lampyris::text::figures;
 use numpy::PyArrayDyn;
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde_json::Value;
 use std::sync::Arc;
+
+/// Share of energy that may be lost without a warning: what `--max-lost` of the command is unless told otherwise.
+const MOST_LOST: f64 = 1e-6;
 
 /// What a run counted, with both errors.
 #[pyclass(frozen, module = "lampyris")]
@@ -64,18 +69,27 @@ impl Results {
         &self.found.results.digest
     }
 
-    /// Sentences on faces of the model that are not in the run; none where all are.
-    fn missing_faces(&self) -> Vec<String> {
-        let [refused, found] = self.scene.job.loaded.refused_faces();
-        let refused = (refused > 0).then(|| {
+    /// Sentences on what the models of the scene lack.
+    fn model_notes(&self) -> Vec<String> {
+        model_notes(&self.scene)
+    }
+
+    /// A sentence on lost light that is more than a sound scene loses, or on powers that are no numbers; `None` where all is well.
+    fn lost_light(&self) -> Option<String> {
+        let power = self.found.results.power;
+        if !power.emitted.is_finite() {
+            return Some(
+                "the powers of the sources sum to no finite number: the powers of this run mean nothing".into(),
+            );
+        }
+        // Not a number where there is no light, of which none is lost.
+        let share = power.lost / power.emitted;
+        (share > MOST_LOST).then(|| {
             format!(
-                "{refused} of {found} faces were refused, and light passes where they are: read_step(FILE).account() lists them with the reasons"
+                "{} % of the energy was lost; the notes of the run say where and why",
+                figures(100.0 * share, 2)
             )
-        });
-        let [bare, all] = self.scene.bare_faces();
-        let bare =
-            (bare > 0).then(|| format!("{bare} of {all} faces have no facets, and light passes where they are"));
-        refused.into_iter().chain(bare).collect()
+        })
     }
 
     /// The document of `results.json`, with the selector of each listed face, and without verdicts where a far field cannot be judged.

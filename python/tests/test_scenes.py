@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import pathlib
+import pickle
 import threading
 import time
+import warnings
 from typing import Any
 
 import numpy as np
@@ -333,6 +335,50 @@ def test_refused_faces_are_told(tmp_path: pathlib.Path) -> None:
         run = scene.trace(progress=False)
     assert "were refused" in run.notes[0]
     assert not lens_in_beam().trace(progress=False).notes
+
+
+@pytest.mark.parametrize(
+    ("damaged", "says"),
+    [
+        # The end of the file, and with it perhaps whole parts.
+        (lambda text: text[: text.rindex("ENDSEC")], "ends before its end section"),
+        # The units: an inch is taken for a mm.
+        (lambda text: text.replace("GLOBAL_UNIT_ASSIGNED_CONTEXT", "UNKNOWN_CONTEXT"), "no unit of length is named"),
+    ],
+    ids=["cut off", "without units"],
+)
+def test_what_could_not_be_read_is_told_before_light_is_traced(damaged: Any, says: str, tmp_path: pathlib.Path) -> None:
+    whole = (ROOT / "fixtures" / "step" / "lens_planoconvex_nurbs_inch.stp").read_text()
+    file = tmp_path / "damaged.stp"
+    file.write_text(damaged(whole))
+    with pytest.warns(UserWarning, match=says):
+        model = lp.read_step(file)
+    for of in (model, file):
+        scene = lp.Scene(of, rays=500).add(lp.point(at=(0, 0, -30)), lp.plane("p", at=(0, 0, 100)))
+        with pytest.warns(UserWarning, match=says):
+            run = scene.trace(progress=False)
+        assert any(says in note for note in run.notes)
+    stages: list[str] = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # Raised as errors they cost no light.
+        with pytest.raises(UserWarning):
+            scene.trace(rays=501, progress=lambda stage, *_: stages.append(stage))
+    assert "tracing" not in stages
+
+
+def test_lost_light_is_warned_of_and_its_run_kept() -> None:
+    # All light starts within a closed solid that lets none through.
+    scene = lp.Scene(ROOT / "fixtures" / "step" / "lens_planoconvex_nurbs.stp", rays=500)
+    scene["*"] = lp.absorber()
+    scene.add(lp.point(at=(0, 0, 2), inside=[]), lp.plane("p", at=(0, 0, 100)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(lp.LostLightWarning, match="100 % of the energy was lost") as caught:
+            scene.trace(progress=False)
+    run = caught.value.run
+    assert run.power["lost"] == run.power["emitted"] == pytest.approx(1.0)
+    assert pickle.loads(pickle.dumps(caught.value)).run.digest == run.digest
 
 
 def test_light_starts_on_faces_and_faces_are_selected_by_their_solid() -> None:
