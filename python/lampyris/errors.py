@@ -37,6 +37,8 @@ def file_path(path: Any, name: str = "path") -> str:
 def existing_file(path: Any, name: str = "path", what: str = "") -> str:
     """A path as text where a file is; :class:`InputError` for a folder, :class:`MissingFileError` for nothing."""
     text = file_path(path, name)
+    if not text:
+        raise MissingFileError(f"{name}: '' names no file; check the path")
     doing = f"cannot read {what}" if what else "cannot be read"
     if os.path.isdir(text):
         raise InputError(f"{text}: {doing}: it is a folder; name a file in it")

@@ -55,12 +55,19 @@ class Material:
 
 def mirror(reflectance: Reflectance = 1.0, scatter: Table | None = None) -> Material:
     """A mirror of this share, or of a table ``[[angle_deg, share], …]`` or ``[[angle_deg, nm, share], …]``."""
-    return Material(plain({"surface": "mirror", "reflectance": reflectance, "scatter": scatter}))
+    return _reflecting("mirror", reflectance, scatter=scatter)
 
 
 def diffuse(reflectance: Reflectance = 1.0) -> Material:
     """Reflects this share by Lambert's law, or that of a table ``[[angle_deg, share], …]`` or ``[[angle_deg, nm, share], …]``."""
-    return Material(plain({"surface": "diffuse", "reflectance": reflectance}))
+    return _reflecting("diffuse", reflectance)
+
+
+def _reflecting(surface: str, reflectance: Reflectance, **keys: Any) -> Material:
+    """``TypeError`` for a reflectance that is ``None``: a scene would take its own."""
+    if reflectance is None:
+        raise TypeError(f"{surface}: reflectance = None: a share from 0 to 1 is needed, or a table of shares")
+    return Material(plain({"surface": surface, "reflectance": reflectance, **keys}))
 
 
 def absorber() -> Material:

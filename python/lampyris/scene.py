@@ -80,7 +80,7 @@ class Scene:
         """From the text of a scene file."""
         scene = cls()
         scene._folder = os.path.abspath(file_path(folder, "folder"))
-        scene._tables = table_from_json(_lampyris.scene_to_json(text, name, scene._folder))
+        scene._tables = table_from_json(_lampyris.scene_to_json(word("text", text), name, scene._folder))
         scene._text = text
         scene._name = name
         return scene
@@ -366,7 +366,10 @@ class Scene:
 
 def named_files(tables: Table) -> list[Table]:
     """The tables of models, sources and media that name a file."""
-    return [entry for kind in ("model", "source", "medium") for entry in tables.get(kind, []) if "file" in entry]
+    lists = [tables.get(kind) for kind in ("model", "source", "medium")]
+    # What is no list of tables is refused where the scene is read.
+    entries = [entry for entries in lists if isinstance(entries, (list, tuple)) for entry in entries]
+    return [entry for entry in entries if isinstance(entry, dict) and "file" in entry]
 
 
 def _raise_stopped(stopped: BaseException | None, part: Part) -> None:

@@ -129,4 +129,5 @@ def rays(array: npt.ArrayLike, at: Vector = (0.0, 0.0, 0.0), **keys: Any) -> Sou
         raise ValueError(f"rays[{row}] has the wavelength {given[row, 7]:g} nm: {advice}")
     require_given("rays", {"at": at})
     table = plain({"kind": "rays", "at": at, **keys})
-    return Source(table, np.ascontiguousarray(given, dtype=np.float64))
+    # A copy: what is written into the caller's array later is no part of the source.
+    return Source(table, np.array(given, dtype=np.float64, order="C"))

@@ -15,6 +15,6 @@ pub(crate) fn require_tolerance(low: f64, high: f64) -> PyResult<()> {
         return Ok(());
     }
     Err(SceneError::new_err(format!(
-        "tolerance ({low}, {high}): it must be two lengths in mm from 1e-7 on, the tighter one first, as in (0.05, 0.2)"
+        "tolerance ({low:?}, {high:?}): it must be two lengths in mm from 1e-7 on, the tighter one first, as in (0.05, 0.2)"
     )))
 }

@@ -75,6 +75,11 @@ import lampyris as lp
         (lambda s: s.add(lp.point(at=None)), TypeError, "point: at = None: three numbers"),  # type: ignore[arg-type]
         (lambda s: s.add(lp.collimated(at=(0, 0, 0), direction=None)), TypeError, "collimated: direction = None"),  # type: ignore[arg-type]
         (lambda s: s.add(lp.ies(None)), TypeError, "file: a str or os.PathLike is needed, not None"),  # type: ignore[arg-type]
+        (lambda s: s.trace(tolerance=1e-300), ValueError, r"tolerance \(1e-300, 1e-300\): .* from 1e-7 on"),
+        (lambda s: s.tables.update(source=[5]) or s.trace(), ValueError, "source"),
+        (lambda s: s.tables.update(model=5) or s.trace(), ValueError, "model"),
+        (lambda s: lp.Scene.parse(5), TypeError, "text: a text is needed, not 5"),  # type: ignore[arg-type]
+        (lambda s: lp.Scene.from_toml(""), OSError, "path: '' names no file"),
         (lambda s: s.save(b"lamp.toml"), TypeError, r"path: .* not bytes; os.fsdecode\(b'lamp.toml'\)"),
     ],
 )
@@ -146,6 +151,10 @@ def test_wrong_materials_are_told_what_to_do() -> None:
     for wrong in (3, None):
         with pytest.raises(TypeError, match="a model is needed"):
             lp.Scene(wrong)  # type: ignore[arg-type]
+    reflecting: Any
+    for reflecting in (lp.mirror, lp.diffuse):
+        with pytest.raises(TypeError, match="reflectance = None: a share"):
+            reflecting(None)
 
 
 def test_a_copy_of_a_scene_goes_its_own_way() -> None:

@@ -295,6 +295,13 @@ def test_the_ends_of_listed_rays_and_the_light_of_faces_are_told() -> None:
         scene.ends(progress=False)
 
 
+def test_rays_are_those_of_the_array_when_it_was_given() -> None:
+    array = np.array([[0.0, 0, 0, 0, 0, 1, 1]])
+    source = lp.rays(array)
+    array[:] = 0.0
+    assert source.rays is not None and source.rays.tolist() == [[0, 0, 0, 0, 0, 1, 1]]
+
+
 def test_a_verdict_needs_angles_of_type_a(tmp_path: pathlib.Path) -> None:
     scene = beam(tmp_path, rays=300, unit="lm")
     scene.add(lp.far_field("b", angles="B", h_deg=(-40, 40), v_deg=(-20, 20), step_deg=1.0))
