@@ -16,17 +16,29 @@ const LEAST_BUDGET: u64 = 1 << 26;
 /// Bytes of an array that are unpacked at a time.
 const BUFFER: usize = 1 << 16;
 
-/// Arrays of a list of rays and the numbers that a ray has in each; the last may be missing.
+/// Arrays of a list of rays and the numbers that a ray has in each, in the order of [`LightRay::from_numbers`].
 const ARRAYS: [(&str, usize); 4] = [("origin", 3), ("direction", 3), ("power", 1), ("wavelength_nm", 1)];
 
-/// The array of [`ARRAYS`] that may be missing.
-const OPTIONAL: &str = "wavelength_nm";
+/// Numbers of a ray without a wavelength.
+const NUMBERS_OF_RAY: usize = 7;
+/// What the numbers of a ray are before any is read: of a list without powers each ray has 1.
+const POWER_ONE: [f64; 8] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
-/// Reads the arrays `origin`, `direction`, `power` and, where there is one, `wavelength_nm`, and hands each ray to `add`, in their order.
+/// Arrays of [`ARRAYS`] that a list of light may lack.
+pub(super) const OPTIONAL_OF_LIGHT: &[&str] = &["wavelength_nm"];
+/// Those that a list may lack of which nothing is asked but where it hits; each ray then has the power 1.
+pub(super) const OPTIONAL_OF_PATHS: &[&str] = &["power", "wavelength_nm"];
+
+/// Reads the arrays `origin`, `direction`, `power` and `wavelength_nm`, of which those named in `optional` may be missing, and hands each
+/// ray to `add`, in their order.
 ///
 /// # Errors
 /// When the file cannot be read, the arrays are not those of a list, or numbers make no ray; those of `add`.
-pub(super) fn read_npz(path: &Path, mut add: impl FnMut(LightRay) -> Result<(), Error>) -> Result<(), Error> {
+pub(super) fn read_npz(
+    path: &Path,
+    optional: &[&str],
+    mut add: impl FnMut(LightRay) -> Result<(), Error>,
+) -> Result<(), Error> {
     let malformed = |m: String| Error::new(path, ErrorKind::Malformed(m));
     let unreadable = |e| Error::new(path, ErrorKind::Read(e));
     let size = open_file(path).and_then(|f| f.metadata()).map_err(unreadable)?.len();
@@ -44,33 +56,34 @@ pub(super) fn read_npz(path: &Path, mut add: impl FnMut(LightRay) -> Result<(), 
         return Err(malformed(format!("array {refusal}")));
     }
     let mut arrays = Vec::new();
+    let mut numbers = POWER_ONE;
+    let (mut end, mut known) = (0, 0);
     for (archive, (name, width)) in archives.iter_mut().zip(ARRAYS) {
+        let place = end;
+        end += width;
         let entry = match archive.by_name(&format!("{name}.npy")) {
             Ok(entry) => entry,
-            Err(zip::result::ZipError::FileNotFound) if name == OPTIONAL => continue,
+            Err(zip::result::ZipError::FileNotFound) if optional.contains(&name) => continue,
             Err(zip::result::ZipError::FileNotFound) => {
                 return Err(malformed(format!("no array '{name}'; a ray list has origin, direction, power")));
             }
             Err(e) => return Err(malformed(format!("array '{name}': {e}"))),
         };
         let array = ArrayReader::open(entry, width, &mut budget);
-        arrays.push((name, array.map_err(|m| malformed(format!("array '{name}': {m}")))?));
+        arrays.push((name, place..end, array.map_err(|m| malformed(format!("array '{name}': {m}")))?));
+        known = end.max(NUMBERS_OF_RAY);
     }
-    let rows = arrays[0].1.rows;
-    if arrays.iter().any(|(_, array)| array.rows != rows) {
+    let rows = arrays[0].2.rows;
+    if arrays.iter().any(|(_, _, array)| array.rows != rows) {
         return Err(malformed("the arrays origin, direction, power and wavelength_nm differ in length".into()));
     }
     for ray in 0..rows {
-        let mut numbers = [0.0; 8];
-        let mut place = 0;
-        for (name, array) in &mut arrays {
-            let row = &mut numbers[place..place + array.width];
-            array.read_row(row).map_err(|m| malformed(format!("array '{name}': {m}")))?;
-            place += array.width;
+        for (name, places, array) in &mut arrays {
+            array.read_row(&mut numbers[places.clone()]).map_err(|m| malformed(format!("array '{name}': {m}")))?;
         }
-        add(LightRay::from_numbers(&numbers[..place]).map_err(|m| malformed(format!("ray {}: {m}", ray + 1)))?)?;
+        add(LightRay::from_numbers(&numbers[..known]).map_err(|m| malformed(format!("ray {}: {m}", ray + 1)))?)?;
     }
-    for (name, array) in &mut arrays {
+    for (name, _, array) in &mut arrays {
         // The sum of an entry's bytes is compared where it ends.
         array.entry.read(&mut [0]).map_err(|e| malformed(format!("array '{name}': {e}")))?;
     }
@@ -82,7 +95,6 @@ struct ArrayReader<'a> {
     entry: BufReader<ZipFile<'a, BufReader<File>>>,
     /// Bytes of a number.
     bytes: u64,
-    width: usize,
     rows: u64,
     /// Rows that were read.
     done: u64,
@@ -132,7 +144,7 @@ impl<'a> ArrayReader<'a> {
             format!("shape ({shape}) takes {wanted} bytes, more than a file of this size can hold of rays; written without \
                  compression (numpy.savez) it is read")
         })?;
-        Ok(Self { entry, bytes, width, rows: dims[0], done: 0 })
+        Ok(Self { entry, bytes, rows: dims[0], done: 0 })
     }
 
     /// Fills `row`, as long as the array is wide, with the numbers of the next row. The error, for people, names the row but not the array.
@@ -159,7 +171,7 @@ impl<'a> ArrayReader<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{NpyArray, read_rays, write_npz};
+    use super::super::{NpyArray, read_ray_paths, read_rays, write_npz};
 
     /// Rays count from 1, as lines of other files do.
     #[test]
@@ -190,6 +202,27 @@ mod tests {
         );
         write_npz(&path, &wavelength("wavelength_nm", &[550.0])).unwrap();
         assert_eq!(read_rays(&path).unwrap()[0].wavelength_nm, Some(550.0));
+    }
+
+    /// Whoever only asks where rays hit needs no power; a source does.
+    #[test]
+    fn rays_without_power_are_paths_and_no_light() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npz");
+        let array = |name, width: usize, data| NpyArray { name, shape: [2, width][..width.min(2)].to_vec(), data };
+        let direction = array("direction", 3, &[0.0, 0.0, 1.0, 0.0, 2.0, 0.0]);
+        let origin = array("origin", 3, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        write_npz(&path, &[origin, direction, array("wavelength_nm", 1, &[500.0, 600.0])]).unwrap();
+        assert!(read_rays(&path).unwrap_err().to_string().contains("no array 'power'"));
+        let rays = read_ray_paths(&path).unwrap();
+        let found: Vec<_> = rays.iter().map(|ray| (ray.numbers(), ray.wavelength_nm)).collect();
+        assert_eq!(
+            found,
+            [
+                ([1.0, 2.0, 3.0, 0.0, 0.0, 1.0, 1.0], Some(500.0)),
+                ([4.0, 5.0, 6.0, 0.0, 1.0, 0.0, 1.0], Some(600.0))
+            ]
+        );
     }
 
     #[test]

@@ -80,13 +80,22 @@ fn the_race_asks_the_rays_of_a_file_and_keeps_them() {
         );
     }
     let kept = Path::new(&path).join(format!("rays/given-{}.npz", rows[0]["facets"]));
-    let mut zip = zip::ZipArchive::new(std::fs::File::open(kept).unwrap()).unwrap();
+    let mut zip = zip::ZipArchive::new(std::fs::File::open(&kept).unwrap()).unwrap();
     let mut array = |name: &str| -> Vec<f64> {
         npyz::NpyFile::new(zip.by_name(&format!("{name}.npy")).unwrap()).unwrap().into_vec().unwrap()
     };
     assert_eq!(array("origin"), [0.0, 0.0, 50.0, 1.0, 2.0, 50.0, 0.0, 0.0, 50.0]);
     assert_eq!(array("direction"), [0.0, 0.0, -1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0]);
     assert_eq!(array("facet"), [-1.0; 3]);
+    // What was kept, without powers, is the same question.
+    let (list, path) = (kept.display().to_string(), folder.path().join("again").display().to_string());
+    let options = ["--json", "--tolerance", "0.05", "--rays-in", &list, "--threads", "1", "-o", &path, &model];
+    let (code, out, err) = lampyris(&[&["study", "bvh"][..], &options].concat());
+    assert_eq!(code, 0, "{err}");
+    let document: Value = serde_json::from_str(&out).unwrap();
+    for row in document["rows"].as_array().unwrap() {
+        assert_eq!((&row["rays"], &row["hits"]), (&3.into(), &2.into()), "{row}");
+    }
 }
 
 /// Boxes as other programs read them: six quads each, inside the lens' own box grown by a step of the nodes.

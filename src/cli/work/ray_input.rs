@@ -1,7 +1,7 @@
 //! Files of rays that a command is told to ask: records as `check --rays-out` writes them, lists and measured ray sets.
 
 use crate::cli::failure::Failure;
-use crate::formats::{Flux, lower_extension, open_file, read_ray_set};
+use crate::formats::{lower_extension, open_file, read_ray_paths};
 use crate::math::Ray;
 use crate::study::records;
 use std::io::BufReader;
@@ -14,9 +14,8 @@ const RAY_SETS: [&str; 7] = ["csv", "txt", "npz", "tm25ray", "dat", "sdf", "ray"
 /// none.
 pub(crate) fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
     let rays: Vec<Ray> = if RAY_SETS.contains(&lower_extension(path).as_str()) {
-        // Which flux a set has says nothing about where its rays run.
-        let set = read_ray_set(path, Flux::Radiant).map_err(|e| Failure::input(e.to_string()))?;
-        set.rays.iter().map(|ray| Ray::new(ray.origin, ray.direction)).collect()
+        let rays = read_ray_paths(path).map_err(|e| Failure::input(e.to_string()))?;
+        rays.iter().map(|ray| Ray::new(ray.origin, ray.direction)).collect()
     } else {
         let read = open_file(path).and_then(|file| records::read(&mut BufReader::new(file)));
         let unreadable = |e| Failure::input(format!("{}: cannot be read as a file of rays: {e}", path.display()));

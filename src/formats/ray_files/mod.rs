@@ -25,7 +25,7 @@ pub use tm25_header::{SpectralData, Tm25Columns, Tm25Header};
 use super::file_names::lower_extension;
 use super::input::open_file;
 use super::ray_csv::read_csv;
-use super::ray_npz::read_npz;
+use super::ray_npz::{OPTIONAL_OF_LIGHT, OPTIONAL_OF_PATHS, read_npz};
 use super::{Error, ErrorKind, LightRay};
 use ray_collector::RayCollector;
 use ray_file::MOST_IN_MEMORY;
@@ -67,7 +67,7 @@ impl RayFile {
                 let mut head = start.to_vec();
                 file.take(TEXT_HEAD).read_to_end(&mut head).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
                 // Of fewer bytes than are asked for, those that are missing are no bytes of the file.
-                if binary && lower_extension(path) != "npz" {
+                if binary && !is_npz(path) {
                     refuse_bytes(path, &head)?;
                 }
                 refuse_text(path, &head)?;
@@ -130,9 +130,31 @@ pub fn read_rays(path: &Path) -> Result<Vec<LightRay>, Error> {
     Ok(rays)
 }
 
+/// Reads rays of which nothing is asked but where they hit, in any format that [`RayFile::open`] knows: an NPZ list may lack `power`, and
+/// its rays have 1 each.
+///
+/// # Errors
+/// As [`RayFile::open`].
+pub fn read_ray_paths(path: &Path) -> Result<Vec<LightRay>, Error> {
+    if !is_npz(path) {
+        return Ok(read_ray_set(path, Flux::Radiant)?.rays);
+    }
+    let mut rays = Vec::new();
+    read_npz(path, OPTIONAL_OF_PATHS, |ray| {
+        rays.push(ray);
+        Ok(())
+    })?;
+    Ok(rays)
+}
+
+/// Whether a file is an archive of arrays, by its name.
+fn is_npz(path: &Path) -> bool {
+    lower_extension(path) == "npz"
+}
+
 /// Reads a list of rays in NPZ or CSV and hands each to `add`.
 fn read_list(path: &Path, add: impl FnMut(LightRay) -> Result<(), Error>) -> Result<(), Error> {
-    if lower_extension(path) == "npz" { read_npz(path, add) } else { read_csv(path, add) }
+    if is_npz(path) { read_npz(path, OPTIONAL_OF_LIGHT, add) } else { read_csv(path, add) }
 }
 
 #[cfg(test)]
