@@ -58,20 +58,26 @@ impl Timing {
     }
 }
 
+/// Longest time that a contender repeats its run for in a round, s: a busy machine gives and takes slices of a few ms.
+const LONGEST_TURN: f64 = 0.02;
+
 /// Contenders timed in alternating rounds: A B C, then C B A, and so on, so that a slow phase of the machine meets all
 /// of them alike.
+///
+/// In a round each repeats its run for as long as the slowest needs for one, 20 ms at most: with one run each, a busy machine would
+/// interrupt the slowest most often, and make it look slower still.
 #[derive(Default)]
 pub struct Rounds<'a> {
     contenders: Vec<(String, Box<dyn FnMut() + 'a>)>,
 }
 
 impl<'a> Rounds<'a> {
-    /// Adds a contender; one call of `run` is one timed run.
+    /// Adds a contender; `run` does the same whenever it is called.
     pub fn add(&mut self, name: impl Into<String>, run: impl FnMut() + 'a) {
         self.contenders.push((name.into(), Box::new(run)));
     }
 
-    /// Runs every contender once untimed and then `rounds` times; results in the order of adding.
+    /// Runs every contender once untimed and then in so many `rounds`; the seconds of a run, a figure a round, in the order of adding.
     pub fn run(self, rounds: usize) -> Vec<(String, Timing)> {
         self.run_telling(rounds, |_| ())
     }
@@ -80,10 +86,12 @@ impl<'a> Rounds<'a> {
     pub(super) fn run_telling(mut self, rounds: usize, tell: impl Fn(f64)) -> Vec<(String, Timing)> {
         let tell_rounds = |done: usize| tell(done as f64 / (rounds + 1) as f64);
         let mut seconds = vec![Vec::with_capacity(rounds); self.contenders.len()];
-        // Untimed: caches, pages and clock frequencies settle.
+        let mut slowest = 0.0f64;
+        // Not among the figures: caches, pages and clock frequencies settle.
         for (_, run) in &mut self.contenders {
-            run();
+            slowest = slowest.max(seconds_of_run(0.0, run));
         }
+        let turn = slowest.min(LONGEST_TURN);
         tell_rounds(1);
         for round in 0..rounds {
             let order: Vec<usize> = if round % 2 == 0 {
@@ -92,13 +100,25 @@ impl<'a> Rounds<'a> {
                 (0..self.contenders.len()).rev().collect()
             };
             for i in order {
-                let start = Instant::now();
-                (self.contenders[i].1)();
-                seconds[i].push(start.elapsed().as_secs_f64());
+                seconds[i].push(seconds_of_run(turn, &mut self.contenders[i].1));
             }
             tell_rounds(round + 2);
         }
         self.contenders.into_iter().zip(seconds).map(|((name, _), s)| (name, Timing::from_seconds(s))).collect()
+    }
+}
+
+/// Repeats `run` for `turn` seconds, once at least; returns the seconds of one run.
+fn seconds_of_run(turn: f64, mut run: impl FnMut()) -> f64 {
+    let start = Instant::now();
+    let mut runs = 0u32;
+    loop {
+        run();
+        runs += 1;
+        let elapsed = start.elapsed().as_secs_f64();
+        if elapsed >= turn {
+            return elapsed / f64::from(runs);
+        }
     }
 }
 
@@ -181,8 +201,22 @@ mod tests {
         let told = RefCell::new(Vec::new());
         let timings = rounds.run_telling(2, |share| told.borrow_mut().push(share));
         assert_eq!(told.into_inner(), [1.0 / 3.0, 2.0 / 3.0, 1.0]);
-        assert_eq!(log.borrow().as_str(), "ababba");
+        let mut order: Vec<char> = log.borrow().chars().collect();
+        // However often each repeats its run.
+        order.dedup();
+        assert_eq!(order, ['a', 'b', 'a', 'b', 'a']);
         assert_eq!(timings[1].0, "b");
         assert_eq!(timings[1].1.runs, 2);
+    }
+
+    #[test]
+    fn short_runs_are_repeated_for_a_whole_turn() {
+        let mut runs = 0;
+        let seconds = seconds_of_run(0.005, || runs += 1);
+        // With a single run the product would be some nanoseconds.
+        assert!(seconds * f64::from(runs) >= 0.005 * (1.0 - 1e-9), "{seconds} s, {runs} runs");
+        let mut runs = 0;
+        seconds_of_run(0.0, || runs += 1);
+        assert_eq!(runs, 1);
     }
 }
