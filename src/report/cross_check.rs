@@ -188,11 +188,12 @@ pub(super) fn count_table(check: &CrossCheck) -> Table {
 /// What rounding leaves of no distance or angle at coordinates of some metres, mm and degrees.
 const ROUNDING: f64 = 1e-10;
 
-/// Makes a table of how far hits and normals of `who` are off, where both hit the same place.
+/// Makes a table of how far hits and normals of `subject` are off, where both hit the same face: far from each other where a ray grazes the
+/// face on its way for one of them alone.
 pub(super) fn error_table(check: &CrossCheck, subject: &str) -> Table {
     let f = &check.facets_vs_exact;
     let columns = [("", ""), ("median", ""), ("99 %", ""), ("largest", ""), ("unit", "")];
-    let title = format!("How far the {subject} are from the spline, where both hit the same place");
+    let title = format!("How far the {subject} are from the spline, where both hit the same face");
     let mut table = Table::new("facet-errors", &title, &columns);
     for (name, s, unit) in [("distance along the ray", &f.t_error_mm, "mm"), ("normal", &f.normal_error_deg, "°")]
     {
@@ -256,7 +257,7 @@ impl CheckReport<'_> {
             ),
         };
         text += &format!(
-            " Where both hit the same place, 99 % of the hits are within **{} mm** along the ray and 99 % of the {} normals within \
+            " Where both hit the same face, 99 % of the hits are within **{} mm** along the ray and 99 % of the {} normals within \
              **{}°** of the spline's.",
             figures(f.t_error_mm.p99, 2),
             self.normals,

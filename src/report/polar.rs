@@ -10,6 +10,8 @@ use crate::text::figures;
 pub(super) const ON_EDGE: f64 = 1e-9;
 /// Circles that a diagram has at most.
 const MOST_CIRCLES: f64 = 5.0;
+/// Circles up to which each has room for its number beside that of the outermost with its unit.
+const FEW_CIRCLES: usize = 3;
 /// What a round intensity may be short of the largest, so that rounding asks for no further circle.
 const LESS: f64 = 1.0 - 1e-9;
 /// Distance of two spokes, degrees.
@@ -85,7 +87,8 @@ impl PolarFrame {
         self.circles.iter().map(circle).chain(self.spokes().map(spoke)).collect()
     }
 
-    /// Returns the numbers of circles, the last with its unit, and of spokes.
+    /// Returns the numbers of circles, the last with its unit, and of spokes. Of many circles the one before the last has none: the unit
+    /// stands there.
     pub(super) fn labels(&self, unit: &str) -> Vec<FrameLabel> {
         let last = self.radius();
         let circle = |&intensity: &f64| {
@@ -98,7 +101,10 @@ impl PolarFrame {
             let side = if gamma % 180 == 0 { 0 } else { gamma.signum() as i8 };
             FrameLabel { text: format!("{}°", gamma.abs()), at, side }
         };
-        self.circles.iter().map(circle).chain(self.spokes().map(spoke)).collect()
+        let count = self.circles.len();
+        let bare = if count > FEW_CIRCLES { Some(count - 2) } else { None };
+        let numbered = self.circles.iter().enumerate().filter(|(k, _)| Some(*k) != bare);
+        numbered.map(|(_, intensity)| circle(intensity)).chain(self.spokes().map(spoke)).collect()
     }
 
     /// Returns what the picture shows along both axes.
@@ -197,11 +203,11 @@ mod tests {
         };
         let (half, unit) = frame(|gamma| 165.0 * gamma.cos().max(0.0));
         let names: Vec<String> = half.labels(&unit).into_iter().map(|label| label.text).collect();
-        assert_eq!(names[..4], ["50", "100", "150", "200 cd"]);
-        assert_eq!(names[4..], ["90°", "60°", "30°", "0°", "30°", "60°", "90°"]);
+        assert_eq!(names[..3], ["50", "100", "200 cd"]);
+        assert_eq!(names[3..], ["90°", "60°", "30°", "0°", "30°", "60°", "90°"]);
         assert!(half.lines().iter().flatten().all(|p| p[1] < 1e-9), "the upper half is dark");
         let (whole, unit) = frame(|_| 1.0);
-        assert_eq!(whole.labels(&unit).len(), 5 + 12);
+        assert_eq!(whole.labels(&unit).len(), 4 + 12);
         assert!(polar("dark", &grid(120, 60, |_, _| 0.0)).is_none());
         let aside = grid(72, 36, |c, gamma| if c == 9 && (0.7..0.8).contains(&gamma) { 500.0 } else { 0.0 });
         assert!(polar("aside", &aside).is_none(), "all light is in C 47.5°");

@@ -242,7 +242,11 @@ fn scene_report<'a>(
         facets,
         facet_count: prepared.facets.facet_count(),
         on_spline: prepared.choice.intersector == IntersectorKind::Exact,
-        drawn: drawn_note(facets.mesh.facets.len(), prepared.facets.facet_count()),
+        drawn: drawn_note(
+            facets.mesh.facets.len(),
+            prepared.facets.facet_count(),
+            prepared.choice.intersector == IntersectorKind::Exact,
+        ),
         unit: prepared.power_unit(),
         check: run.check.as_ref(),
         figures: all_figures,
@@ -327,15 +331,18 @@ fn facet_table(prepared: &PreparedScene) -> Table {
     table
 }
 
-/// Returns what the view of the facets shows, in words, by the numbers drawn and traced.
-fn drawn_note(drawn: usize, traced: usize) -> String {
-    if drawn == traced {
-        return "Facets as traced, parts in their colours, with some ray paths of the run.".into();
+/// Returns what the view of the facets shows, in words, by the numbers of those drawn and of all, which were traced unless the run was on
+/// the spline.
+fn drawn_note(drawn: usize, all: usize, on_spline: bool) -> String {
+    if drawn == all {
+        let shown = if on_spline { "Facets of the surfaces that were traced" } else { "Facets as traced" };
+        return format!("{shown}, parts in their colours, with some ray paths of the run.");
     }
+    let which = if on_spline { "of the surfaces that were traced" } else { "that were traced" };
     format!(
-        "Of {} facets that were traced {} are shown: a part that is placed often is drawn once, its other places are boxes, of very many \
+        "Of {} facets {which} {} are shown: a part that is placed often is drawn once, its other places are boxes, of very many \
          some; with some ray paths of the run.",
-        grouped(traced as u64),
+        grouped(all as u64),
         grouped(drawn as u64)
     )
 }
