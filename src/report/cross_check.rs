@@ -188,13 +188,14 @@ pub(super) fn count_table(check: &CrossCheck) -> Table {
 /// What rounding leaves of no distance or angle at coordinates of some metres, mm and degrees.
 const ROUNDING: f64 = 1e-10;
 
-/// Makes a table of how far hits and normals of `subject` are off, where both hit the same face: far from each other where a ray grazes the
-/// face on its way for one of them alone.
+/// Makes a table of how far hits and normals of `subject` are off, where both hit the same face within the sag.
 pub(super) fn error_table(check: &CrossCheck, subject: &str) -> Table {
     let f = &check.facets_vs_exact;
     let columns = [("", ""), ("median", ""), ("99 %", ""), ("largest", ""), ("unit", "")];
-    let title = format!("How far the {subject} are from the spline, where both hit the same face");
-    let mut table = Table::new("facet-errors", &title, &columns);
+    let title = format!("How far the {subject} are from the spline, where both hit the same face within the sag");
+    let mut table = Table::new("facet-errors", &title, &columns).caption(
+        "Along a ray that grazes the two hits may be far apart, and their normals turned: within the sag they are along the normal.",
+    );
     for (name, s, unit) in [("distance along the ray", &f.t_error_mm, "mm"), ("normal", &f.normal_error_deg, "°")]
     {
         let [median, most, largest] = [s.p50, s.p99, s.max].map(|x| Cell::Known(x, ROUNDING, 4));
@@ -257,7 +258,7 @@ impl CheckReport<'_> {
             ),
         };
         text += &format!(
-            " Where both hit the same face, 99 % of the hits are within **{} mm** along the ray and 99 % of the {} normals within \
+            " Where both hit the same face within the sag, 99 % of the hits are within **{} mm** along the ray and 99 % of the {} normals within \
              **{}°** of the spline's.",
             figures(f.t_error_mm.p99, 2),
             self.normals,
