@@ -63,8 +63,8 @@ pub use printable::{
     printable_toml,
 };
 pub use ray_files::{
-    Flux, RayBlock, RayFile, RaySet, SpectralData, Tm25, Tm25Columns, Tm25Header, Tm25Reader, read_ray_paths,
-    read_ray_set, read_rays, read_tm25, write_tm25,
+    Flux, RayBlock, RayFile, RaySet, SpectralData, Tm25, Tm25Columns, Tm25Header, Tm25Reader, read_ray_facets,
+    read_ray_paths, read_ray_set, read_rays, read_tm25, write_tm25,
 };
 pub use rays::{LightRay, write_rays};
 pub use stream::{Column, NpzStream};

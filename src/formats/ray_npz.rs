@@ -90,6 +90,34 @@ pub(super) fn read_npz(
     Ok(())
 }
 
+/// Reads the array `facet` beside so many rays, a number each; empty where there is none.
+///
+/// # Errors
+/// When the file cannot be read, or the array has no number for each ray.
+pub(super) fn read_facets(path: &Path, rays: usize) -> Result<Vec<f64>, Error> {
+    let malformed = |m: String| Error::new(path, ErrorKind::Malformed(m));
+    let unusable = |m: String| malformed(format!("array 'facet': {m}"));
+    let file = open_file(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+    let archive = ZipArchive::new(BufReader::new(file));
+    let mut archive = archive.map_err(|e| malformed(format!("not an NPZ file: {e}")))?;
+    let entry = match archive.by_name("facet.npy") {
+        Ok(entry) => entry,
+        Err(zip::result::ZipError::FileNotFound) => return Ok(Vec::new()),
+        Err(e) => return Err(unusable(e.to_string())),
+    };
+    // No more of it is unpacked than there are rays.
+    let mut budget = u64::MAX;
+    let mut array = ArrayReader::open(entry, 1, &mut budget).map_err(unusable)?;
+    if array.rows != rays as u64 {
+        return Err(unusable(format!("it has {} rows, where there are {rays} rays", array.rows)));
+    }
+    let mut facets = vec![0.0; rays];
+    for facet in facets.chunks_mut(1) {
+        array.read_row(facet).map_err(unusable)?;
+    }
+    Ok(facets)
+}
+
 /// An NPY array of f64 or f32, read row by row.
 struct ArrayReader<'a> {
     entry: BufReader<ZipFile<'a, BufReader<File>>>,
@@ -171,7 +199,7 @@ impl<'a> ArrayReader<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{NpyArray, read_ray_paths, read_rays, write_npz};
+    use super::super::{NpyArray, read_ray_facets, read_ray_paths, read_rays, write_npz};
 
     /// Rays count from 1, as lines of other files do.
     #[test]
@@ -212,7 +240,10 @@ mod tests {
         let array = |name, width: usize, data| NpyArray { name, shape: [2, width][..width.min(2)].to_vec(), data };
         let direction = array("direction", 3, &[0.0, 0.0, 1.0, 0.0, 2.0, 0.0]);
         let origin = array("origin", 3, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
-        write_npz(&path, &[origin, direction, array("wavelength_nm", 1, &[500.0, 600.0])]).unwrap();
+        let (wavelength, facet) = (array("wavelength_nm", 1, &[500.0, 600.0]), array("facet", 1, &[-1.0, 7.0]));
+        write_npz(&path, &[origin, direction, wavelength, facet]).unwrap();
+        assert_eq!(read_ray_facets(&path, 2).unwrap(), [-1.0, 7.0]);
+        assert!(read_ray_facets(&path, 3).unwrap_err().to_string().contains("2 rows"));
         assert!(read_rays(&path).unwrap_err().to_string().contains("no array 'power'"));
         let rays = read_ray_paths(&path).unwrap();
         let found: Vec<_> = rays.iter().map(|ray| (ray.numbers(), ray.wavelength_nm)).collect();

@@ -33,6 +33,7 @@ fn the_race_writes_rows_pictures_and_the_octree() {
     let surface: Vec<_> = rows.iter().filter(|r| r["rays_kind"] == "surface").collect();
     assert_eq!(surface.len(), 8 * 3);
     assert!(surface.iter().all(|r| r["hits"].as_u64() > Some(0) && r["hits"].as_u64() <= r["rays"].as_u64()));
+    ask_again(folder.path(), &model, surface[0]);
     let read = |name: &str| std::fs::read(folder.path().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
     let text = String::from_utf8(read("octree.txt")).unwrap();
     for part in ["depth", "listed", "bytes a facet", "incoherent rays:", "nodes and", "blocks of 1, 2, 3, 4 facets"]
@@ -54,6 +55,19 @@ fn the_race_writes_rows_pictures_and_the_octree() {
     let page = String::from_utf8(read("report.html")).unwrap();
     assert!(page.contains("asked in batches") && page.contains("by the faster of its two calls"));
     boxes_are_closed_and_hold_the_lens(folder.path());
+}
+
+/// Rays that leave facets are the same question when they are read again: without the facets they would meet those that they start on.
+fn ask_again(folder: &Path, model: &str, first: &Value) {
+    let list = folder.join(format!("rays/surface-{}.npz", first["facets"])).display().to_string();
+    let path = folder.join("again").display().to_string();
+    let options = ["--json", "--tolerance", "0.01", "--rays-in", &list, "--threads", "1", "-o", &path, model];
+    let (code, out, err) = lampyris(&[&["study", "bvh"][..], &options].concat());
+    assert_eq!(code, 0, "{err}");
+    let document: Value = serde_json::from_str(&out).unwrap();
+    let row = document["rows"].as_array().unwrap().iter().find(|row| row["intersector"] == first["intersector"]);
+    let row = row.unwrap();
+    assert_eq!((&row["rays"], &row["hits"]), (&first["rays"], &first["hits"]), "{row}");
 }
 
 #[test]

@@ -8,7 +8,7 @@ use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::octree_shape::OctreeShape;
 use crate::cli::work::output_place::{folder_of, make_folder};
-use crate::cli::work::ray_input::read_rays;
+use crate::cli::work::ray_input::read_leaving_rays;
 use crate::cli::work::{input_files, threads};
 use crate::formats::{NpyArray, write_npz};
 use crate::intersect::bvh::{self, Bvh};
@@ -64,7 +64,7 @@ pub(crate) fn run(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<BvhBenchmark, Failure> {
     // Read first: a file that is no list of rays must not cost the time of meshing.
-    let given = command.rays_in.map(read_rays).transpose()?;
+    let given = command.rays_in.map(read_leaving_rays).transpose()?;
     let embree = command.embree.map(open_embree).transpose()?;
     let loaded = match command.file {
         None => demo::lamp()?.1,
@@ -83,7 +83,7 @@ pub(crate) fn run(
         let mesh = tessellate(&loaded.model, &tessellate::Settings::uniform(tolerance)).mesh;
         let octree = Octree::build(&mesh, &octree::Settings::default());
         let kinds = match &given {
-            Some(rays) => vec![(GIVEN, rays.clone())],
+            Some(rays) => vec![(GIVEN, rays.on_mesh(&mesh))],
             None => own_rays(&mesh, &octree, tolerance, command.tracing),
         };
         for (kind, rays) in &kinds {

@@ -25,7 +25,7 @@ pub use tm25_header::{SpectralData, Tm25Columns, Tm25Header};
 use super::file_names::lower_extension;
 use super::input::open_file;
 use super::ray_csv::read_csv;
-use super::ray_npz::{OPTIONAL_OF_LIGHT, OPTIONAL_OF_PATHS, read_npz};
+use super::ray_npz::{OPTIONAL_OF_LIGHT, OPTIONAL_OF_PATHS, read_facets, read_npz};
 use super::{Error, ErrorKind, LightRay};
 use ray_collector::RayCollector;
 use ray_file::MOST_IN_MEMORY;
@@ -145,6 +145,15 @@ pub fn read_ray_paths(path: &Path) -> Result<Vec<LightRay>, Error> {
         Ok(())
     })?;
     Ok(rays)
+}
+
+/// Reads which facet each of so many rays leaves, by an array `facet` beside them in an NPZ file; below zero it leaves none. Empty where
+/// the file has none.
+///
+/// # Errors
+/// When the file cannot be read, or the array has no number for each ray.
+pub fn read_ray_facets(path: &Path, rays: usize) -> Result<Vec<f64>, Error> {
+    if is_npz(path) { read_facets(path, rays) } else { Ok(Vec::new()) }
 }
 
 /// Whether a file is an archive of arrays, by its name.
