@@ -11,6 +11,7 @@ mod far_sources;
 #[path = "../support/files.rs"]
 mod files;
 mod fixture_scenes;
+mod flush_solids;
 mod flush_sources;
 mod frames;
 mod glass_catalogues;

@@ -56,9 +56,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             partner = self.resolve_contact(ray, &mut at);
         }
         if let Some(partner) = &partner {
-            at.hit = &partner.hit;
-            at.face = partner.face;
-            at.point = partner.point;
+            at.move_to(partner);
         }
         // From inside an opaque solid nothing can be seen: the ray got in by a gap.
         if at.face.opaque_solid && !at.entering {

@@ -264,8 +264,8 @@ pub(super) fn emit_into_contact(context: &Context<'_>, face: FaceId, normal: Vec
 /// largest gap that facets of a usual sag leave between them.
 const DEEPEST_SLIP: f64 = 1.0;
 
-/// Returns the opaque face that light meets where it leaves a body, within the glue distance; for a hit on an opaque solid from inside, its
-/// front up to [`DEEPEST_SLIP`] before the ray's start. `None` where there is no such face.
+/// Returns the opaque face that lies against the one by which light leaves a body, within the glue distance; for a hit on an opaque solid
+/// from inside, its front up to [`DEEPEST_SLIP`] before the ray's start. `None` where there is no such face.
 #[cold]
 pub(super) fn opaque_contact(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<FaceHit> {
     let probe = if at.face.opaque_solid {
@@ -275,14 +275,13 @@ pub(super) fn opaque_contact(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> 
     } else {
         probe_at(context, ray, at)
     };
-    let is_front = |found: &Hit, face: &FaceOptics| {
-        face.medium_on_opaque && face.body == AMBIENT && ray.direction.dot(found.geometric_normal) < 0.0
-    };
-    // The nearest that lies along the face, or is a front, and no other: behind it the ray would be inside of the solid. A face that stands
-    // across is of an edge that the probe begins beyond, as the wall of a dome that light was reflected at just above its board.
-    let lies_along =
-        |found: &Hit| at.face.opaque_solid || found.geometric_normal.dot(at.hit.geometric_normal).abs() > ALIGNED;
-    let (hit, face) =
-        faces_along(context, probe).find(|(found, face)| is_front(found, face) || lies_along(found))?;
-    is_front(&hit, &face).then(|| FaceHit { hit, face, point: probe.point_at(hit.t) })
+    let slipped = at.face.opaque_solid;
+    let cosine = |found: &Hit| found.geometric_normal.dot(at.hit.geometric_normal);
+    // The nearest that lies along the face, and no other: behind it the ray would be inside of the solid. A face that stands across is of
+    // an edge: the wall of a dome that light was reflected at just above its board, or that of a dot which light comes to beside it.
+    let lies_along = |found: &Hit| slipped || cosine(found).abs() > ALIGNED;
+    let (hit, face) = faces_along(context, probe).find(|(found, _)| lies_along(found))?;
+    let is_opaque = face.medium_on_opaque && face.body == AMBIENT;
+    let is_front = ray.direction.dot(hit.geometric_normal) < 0.0 && (slipped || cosine(&hit) < 0.0);
+    (is_opaque && is_front).then(|| FaceHit { hit, face, point: probe.point_at(hit.t) })
 }

@@ -78,6 +78,15 @@ impl<'a> SurfaceInteraction<'a> {
         Self { hit, face, entering, point, skip: 0.0, normals, overlap: None, refused_contact: false }
     }
 
+    /// Moves the meeting to another face at the same place, which says what happens.
+    pub(super) fn move_to(&mut self, other: &'a FaceHit) {
+        self.hit = &other.hit;
+        self.face = other.face;
+        self.point = other.point;
+        self.normals =
+            FacetNormals { interpolated: other.hit.normal, geometric: other.hit.geometric_normal, ..self.normals };
+    }
+
     /// Returns the place as one that a ray leaves.
     #[inline(always)]
     pub(super) fn departure(&self) -> Departure {
