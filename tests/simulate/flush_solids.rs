@@ -1,4 +1,4 @@
-//! Solids whose faces are flush: dots on a guide of light, and mirrors that lie nearly in a face.
+//! Solids whose faces are flush: dots on a guide of light, solids of one part that end in one plane.
 
 use crate::support::{Shape, World};
 use lampyris::math::{Frame, Point, Vector};
@@ -57,4 +57,53 @@ fn light_is_reflected_about_the_normal_of_the_face_that_it_meets() {
         [[receiver]]\nname = 'aside'\nat = [-1, 0, 100]\nsize = [0.5, 0.5]\n";
     let results = world.run(text, |_| ());
     assert!((results.receivers[0].power - 1.0).abs() < 1e-9, "{:?}", results.power);
+}
+
+/// A block and a post that stands through it, both with their bottom in z = 0: two parts, or two solids of one.
+fn post_through_block(in_one_part: bool) -> World {
+    let mut world = World::default();
+    world.cuboid("block", Point::new(-5.0, -5.0, 0.0), Point::new(5.0, 5.0, 5.0));
+    world.cuboid("post", Point::new(-1.0, -2.5, 0.0), Point::new(3.0, 1.5, 8.0));
+    if in_one_part {
+        let second = world.model.parts[1].shells.remove(0);
+        world.model.parts[0].shells.push(second);
+        world.model.parts.truncate(1);
+        world.model.instances.truncate(1);
+    }
+    world
+}
+
+fn through_all(index: f64) -> String {
+    format!(
+        "[run]\nrays = 6000\nmax_bounces = 200\n[[medium]]\nname = 'clear'\nindex = {index:?}\n[[material]]\npart = '*'\nmedium = 'clear'
+        [[source]]\nkind = 'lambertian'\nat = [0.3, 0.2, -20]\ndirection = [0, 0, 1]\nradius = 4
+        [[source]]\nkind = 'lambertian'\nat = [0.3, 0.2, 20]\ndirection = [0, 0, -1]\nradius = 4
+        [[source]]\nkind = 'point'\nat = [0.3, 0.2, 2.15]\n{FAR}"
+    )
+}
+
+/// Where nothing refracts all light comes out of solids of one part that end in one plane, alone and on a plate.
+#[test]
+fn light_passes_solids_of_one_part_that_end_in_one_plane() {
+    for plate in [false, true] {
+        let mut world = post_through_block(true);
+        if plate {
+            world.cuboid("plate", Point::new(-9.0, -9.0, -2.0), Point::new(9.0, 9.0, 0.0));
+        }
+        let results = world.run(&through_all(1.0), |_| ());
+        let power = &results.power;
+        assert_eq!(results.lost_rays, 0, "plate {plate}: {:?}", results.ledger.first());
+        assert!((power.received - power.emitted).abs() < 1e-9 * power.emitted, "plate {plate}: {power:?}");
+    }
+}
+
+/// Solids of one part that end in one plane are to light what two parts there are.
+#[test]
+fn solids_of_one_part_that_end_in_one_plane_are_as_two_parts() {
+    let [one, two] =
+        [true, false].map(|in_one_part| post_through_block(in_one_part).run(&through_all(1.5), |_| ()));
+    assert_eq!((one.lost_rays, two.lost_rays), (0, 0), "{:?} {:?}", one.ledger.first(), two.ledger.first());
+    let share = |power: f64| power / one.power.emitted;
+    let [a, b] = [&one, &two].map(|results| share(results.power.received));
+    assert!((a - b).abs() < 0.01, "{a} {b}");
 }

@@ -257,7 +257,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         if C::MEDIA && at.skip > 0.0 {
             let normal = at.hit.geometric_normal;
             let reach = way_through_glue(at.skip, direction.dot(normal));
-            let contact = LeftContact { face: at.face, normal, reach };
+            let contact = LeftContact { face: at.face, normal, reach, flush_siblings: at.flush_solids > 1 };
             let is_inside = |body| path.payload.cross(body, false).is_some();
             next.t_min = end_of_contact(self.context, &next, &contact, &is_inside);
         }

@@ -6,6 +6,7 @@ use crate::intersect::{Cost, Hit};
 use crate::math::{Departure, FaceId, Point, Ray, Vector};
 use crate::simulate::body::AMBIENT;
 use crate::simulate::surfaces::{FaceOptics, Surface};
+use smallvec::SmallVec;
 
 /// A hit with what its face is to light.
 #[derive(Clone, Copy)]
@@ -22,12 +23,12 @@ impl FaceHit {
     }
 }
 
-/// Returns the body on the other side of a face that lies on a face of another body within the glue distance; `None` where there is none.
+/// Returns the face of another body that a face lies on within the glue distance; `None` where there is none.
 ///
 /// Found by asking for faces from just before the hit, this face left out: so a face at the very same place is found whether rounding puts
 /// it before or behind.
-pub(super) fn touching_body(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<u32> {
-    touching_face(context, ray, at, |other| touches_other(&at.face, other)).map(|other| other.face.body)
+pub(super) fn touching_body(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<FaceHit> {
+    touching_face(context, ray, at, |other| touches_other(&at.face, other))
 }
 
 /// Whether two faces are of different bodies, of which this one touches others.
@@ -40,21 +41,59 @@ pub(super) fn may_be_siblings(face: &FaceOptics, other: &FaceOptics) -> bool {
     face.touches_sibling && other.touches_sibling && other.body == face.body && other.solid != face.solid
 }
 
-/// Whether another solid of the same body lies against the face within the glue distance, looking the other way: between them there is no
-/// interface.
-#[inline(never)]
-pub(super) fn touches_sibling(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> bool {
-    faces_along(context, probe_at(context, ray, at)).any(|(found, other)| {
-        let against = found.geometric_normal.dot(at.hit.geometric_normal) < -ALIGNED;
-        may_be_siblings(&at.face, &other) && against
-    })
+/// Other solids of the body of a face, at the place of a hit.
+#[derive(Clone, Copy)]
+pub(super) struct Siblings {
+    /// Whether one lies against the face, looking the other way: between them there is no interface.
+    pub(super) against: bool,
+    /// Solids of the body that are entered or left there at once: the face's own, and those that overlap it and end at the same place.
+    pub(super) flush_solids: u32,
 }
 
-/// Returns another body whose face lies at the same place and looks the same way: bodies that overlap and end at the same plane. Both are
-/// entered or left at once, wherever rounding puts the second face. `None` where there is none, or where the own solid lies against that
-/// face, as next to the edge of a wedge: its body ends where the other begins.
+/// Returns what other solids of its body have within the glue distance of a face.
+#[inline(always)]
+pub(super) fn siblings_at(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Siblings {
+    if at.face.touches_sibling {
+        find_siblings(context, ray, at)
+    } else {
+        Siblings { against: false, flush_solids: 1 }
+    }
+}
+
+/// Finds the siblings of [`siblings_at`] along the ray.
 #[inline(never)]
-pub(super) fn aligned_body(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<u32> {
+fn find_siblings(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Siblings {
+    let entering = ray.direction.dot(at.hit.geometric_normal) < 0.0;
+    let probe = probe_at(context, ray, at);
+    let own_t = 0.5 * probe.t_max;
+    // What lies behind the start of the ray was crossed before, as by light that has come in beside the edge of a solid.
+    let start_t = own_t - (at.point - ray.origin).dot(ray.direction) + ray.t_min + rounding_at(at.point);
+    let mut against = false;
+    let mut flush: SmallVec<[u32; MOST_COINCIDENT_FACES]> = SmallVec::new();
+    for (hit, face) in faces_along(context, probe) {
+        if !may_be_siblings(&at.face, &face) {
+            continue;
+        }
+        let cosine = hit.geometric_normal.dot(at.hit.geometric_normal);
+        against |= cosine < -ALIGNED;
+        let same_way = (ray.direction.dot(hit.geometric_normal) < 0.0) == entering;
+        let behind_start = hit.t < own_t && hit.t <= start_t;
+        if cosine > ALIGNED && same_way && !behind_start && !flush.contains(&face.solid) {
+            // As of two bodies: where the own solid lies against that face it ends where the other begins.
+            let place = FaceHit { hit, face, point: probe.point_at(hit.t) };
+            if !lies_on_solid(context, ray, &place, &at.face) {
+                flush.push(face.solid);
+            }
+        }
+    }
+    Siblings { against, flush_solids: 1 + flush.len() as u32 }
+}
+
+/// Returns the face of another body that lies at the same place and looks the same way: bodies that overlap and end at the same plane. Both
+/// are entered or left at once, wherever rounding puts the second face. `None` where there is none, or where the own solid lies against
+/// that face, as next to the edge of a wedge: its body ends where the other begins.
+#[inline(never)]
+pub(super) fn aligned_body(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<FaceHit> {
     // The direction of the ray against the outward normal tells whether it goes in or out, whichever of the two
     // faces is met first.
     let entering = ray.direction.dot(at.hit.geometric_normal) < 0.0;
@@ -65,7 +104,7 @@ pub(super) fn aligned_body(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Op
         other.touches_body && other.body != at.face.body && same_way && aligned
     })?;
     let other = FaceHit { hit, face, point: probe.point_at(hit.t) };
-    (!lies_on_solid(context, ray, &other, &at.face)).then_some(face.body)
+    (!lies_on_solid(context, ray, &other, &at.face)).then_some(other)
 }
 
 /// Whether the solid that the face `of_solid` bounds lies against another face within the glue distance.
@@ -116,6 +155,8 @@ pub(super) struct LeftContact {
     pub(super) normal: Vector,
     /// Length, mm, within which the segment meets the other face.
     pub(super) reach: f64,
+    /// Whether other solids of its body that end there were entered or left at once with it.
+    pub(super) flush_siblings: bool,
 }
 
 impl LeftContact {
@@ -138,6 +179,10 @@ impl LeftContact {
         if face.body == AMBIENT {
             // Of two sheets or solids at the very same place the first decides, and the back of a solid cannot be met.
             return found.hit.t <= rounding_at(next.origin) || face.opaque_solid && !entering;
+        }
+        // Solids of one body that end at one place were all met there, whichever of them the light is in besides.
+        if self.flush_siblings && !against && may_be_siblings(&self.face, face) {
+            return true;
         }
         if entering {
             let ends_there = |other: &FaceOptics| is_inside(other.body);
@@ -255,7 +300,8 @@ pub(super) fn emit_into_contact(context: &Context<'_>, face: FaceId, normal: Vec
     };
     faces_along(context, probe).any(lies_on_it).then(|| {
         // Its media are not known yet: of the body on the die only the face against it is passed.
-        ray.t_min = end_of_contact(context, ray, &LeftContact { face: *optics, normal, reach }, &|_| true);
+        let contact = LeftContact { face: *optics, normal, reach, flush_siblings: false };
+        ray.t_min = end_of_contact(context, ray, &contact, &|_| true);
         Ray::new(ray.point_at(ray.t_min), ray.direction)
     })
 }

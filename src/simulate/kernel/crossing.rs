@@ -1,6 +1,6 @@
 //! From one body into the next: the media on both sides of a face, where bodies touch or overlap too.
 
-use super::contact::{aligned_body, touches_sibling, touching_body};
+use super::contact::{aligned_body, siblings_at, touching_body};
 use super::context::Context;
 use super::interaction::SurfaceInteraction;
 use super::media_at::recover_media;
@@ -28,23 +28,30 @@ pub(super) fn cross_face<C: RayPayload>(
     ray: &Ray,
     at: &mut SurfaceInteraction<'_>,
 ) -> Result<Crossing<C>, LostCause> {
+    let siblings = siblings_at(context, ray, &at.face_hit());
     // Two solids of one part have one medium: a bare boundary between them is drawn in the file and absent in the glass, and a coated one,
     // as of a beam splitter cemented of two prisms, has that medium on both sides. Only when the ray is in that body: from outside the
     // other solid is entered as usual.
-    let leaves_sibling = at.face.touches_sibling && payload.cross(at.face.body, false).is_some();
-    if leaves_sibling && touches_sibling(context, ray, &at.face_hit()) {
+    if siblings.against && payload.cross(at.face.body, false).is_some() {
         // From one solid of a part into the next.
         at.skip = context.glue_mm();
         return Ok(Crossing { here: payload, across: payload });
     }
-    // `payload.cross` refuses what cannot be, as leaving a body that the ray is not in.
+    // Solids of one part that overlap and end at one place are entered or left at once.
+    at.flush_solids = siblings.flush_solids;
+    if at.flush_solids > 1 {
+        at.skip = context.glue_mm();
+    }
+    // `cross_solids` refuses what cannot be, as leaving a body that the ray is not in.
+    let cross_own = |payload: C| cross_solids(payload, at.face.body, at.entering, siblings.flush_solids);
     let mut here = payload;
-    let mut across = payload.cross(at.face.body, at.entering);
+    let mut across = cross_own(payload);
     // A ray may have slipped through a crack or a touching edge unseen. Before it is lost, its media are found anew from where it is; the
     // crossing is tried once more with them.
+    let touching = at.face.touches_body || at.face.touches_sibling;
     if across.is_none()
-        && let Some(recovered) = recover_media(context, &payload, ray, at.hit.t, at.face.touches_body)
-        && let Some(beyond) = recovered.cross(at.face.body, at.entering)
+        && let Some(recovered) = recover_media(context, &payload, ray, at.hit.t, touching)
+        && let Some(beyond) = cross_own(recovered)
     {
         (here, across) = (recovered, Some(beyond));
     }
@@ -58,6 +65,21 @@ pub(super) fn cross_face<C: RayPayload>(
         None if here.is_full() && at.entering => Err(LostCause::TooDeep),
         None => Err(LostCause::ImpossibleMedium),
     }
+}
+
+/// Returns the payload of a ray that enters or leaves so many solids of one body at once; `None` for what cannot be. Light that is known to
+/// be in fewer of them leaves those.
+#[inline(always)]
+fn cross_solids<C: RayPayload>(payload: C, body: u32, entering: bool, solids: u32) -> Option<C> {
+    let mut crossed = payload.cross(body, entering)?;
+    for _ in 1..solids {
+        match crossed.cross(body, entering) {
+            Some(next) => crossed = next,
+            None if entering => return None,
+            None => break,
+        }
+    }
+    Some(crossed)
 }
 
 /// Crosses both faces at once where the face lies on one of another body, against it or, where bodies overlap, looking the same way,
@@ -75,15 +97,17 @@ fn cross_contact<C: RayPayload>(
     if let Some(other) = touching_body(context, ray, &place) {
         // Whichever way the light goes on, it has met both faces.
         at.skip = context.glue_mm();
+        let (body, solids) = (other.face.body, siblings_at(context, ray, &other).flush_solids);
         *across = match *across {
             // Through both faces at once, whichever the ray met first.
             Some(first) if !(at.entering && here.body() == at.face.body) => {
                 // A first face that is met from outside of its own body leads into it, and the other one is left
                 // behind it.
-                let both = first.cross(other, !at.entering).or_else(|| {
+                let both = cross_solids(first, body, !at.entering, solids).or_else(|| {
                     // The other body is not where the light should be: it has passed an edge of three or more unseen.
                     let recovered = recover_media(context, here, ray, at.hit.t, true)?;
-                    let both = recovered.cross(at.face.body, at.entering)?.cross(other, !at.entering)?;
+                    let first = cross_solids(recovered, at.face.body, at.entering, at.flush_solids)?;
+                    let both = cross_solids(first, body, !at.entering, solids)?;
                     *here = recovered;
                     Some(both)
                 });
@@ -96,8 +120,12 @@ fn cross_contact<C: RayPayload>(
         };
     // Numbered alike from both sides, so that the order of crossing does not depend on which face came first.
     } else if let Some(other) = aligned_body(context, ray, &place) {
-        let [first, second] = [at.face.body.min(other), at.face.body.max(other)];
-        let both = here.cross(first, at.entering).and_then(|c| c.cross(second, at.entering));
+        let others = siblings_at(context, ray, &other).flush_solids;
+        let mut crossed = [(at.face.body, at.flush_solids), (other.face.body, others)];
+        crossed.sort_unstable();
+        let [(first, of_first), (second, of_second)] = crossed;
+        let both = cross_solids(*here, first, at.entering, of_first)
+            .and_then(|payload| cross_solids(payload, second, at.entering, of_second));
         let inside = here.cross(first, false).is_some();
         // What looks the same way but is not passed here, as beyond an edge, is left alone.
         if inside == here.cross(second, false).is_some() {

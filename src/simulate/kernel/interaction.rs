@@ -21,6 +21,8 @@ pub(super) struct SurfaceInteraction<'a> {
     pub(super) point: Point,
     /// Distance from the face that the next segment passes over, mm: the glue distance at touching faces, else 0.
     pub(super) skip: f64,
+    /// Solids of the body of its face that are entered or left here at once.
+    pub(super) flush_solids: u32,
     /// Its normals, and how often the facet's own had to be taken.
     pub(super) normals: FacetNormals,
     /// Two bodies that are found to overlap here.
@@ -75,7 +77,8 @@ impl<'a> SurfaceInteraction<'a> {
     #[inline(always)]
     pub(super) fn new(hit: &'a Hit, face: FaceOptics, entering: bool, point: Point) -> Self {
         let normals = FacetNormals::new(hit.normal, hit.geometric_normal);
-        Self { hit, face, entering, point, skip: 0.0, normals, overlap: None, refused_contact: false }
+        let (skip, flush_solids) = (0.0, 1);
+        Self { hit, face, entering, point, skip, flush_solids, normals, overlap: None, refused_contact: false }
     }
 
     /// Moves the meeting to another face at the same place, which says what happens.
