@@ -27,7 +27,7 @@ pub fn mesh_settings(
     }
     settings.angle_deg = meshing.angle_deg.or(accuracy.and_then(|a| a.angle_deg));
     // Faces that are one interface for light are faceted once.
-    settings.glue_mm = scene.map_or(0.0, |s| s.run.glue_mm);
+    settings.glue_mm = scene.map_or(0.0, |s| s.run.glue_distance());
     if let Some(plan) = &meshing.plan {
         plan.apply(&mut settings);
     }

@@ -1,4 +1,4 @@
-//! Solids whose faces are flush: dots on a guide of light, solids of one part that end in one plane.
+//! Solids whose faces are flush: dots on a guide of light, solids of one part that end in one plane, gaps as wide as the glue distance.
 
 use crate::support::{Shape, World};
 use lampyris::math::{Frame, Point, Vector};
@@ -106,4 +106,21 @@ fn solids_of_one_part_that_end_in_one_plane_are_as_two_parts() {
     let share = |power: f64| power / one.power.emitted;
     let [a, b] = [&one, &two].map(|results| share(results.power.received));
     assert!((a - b).abs() < 0.01, "{a} {b}");
+}
+
+/// Two blocks as far apart as the default glue distance, a micrometre: rounding puts their faces nearer or farther, and all rays take them
+/// for one interface.
+#[test]
+fn a_gap_as_wide_as_the_glue_distance_is_closed_for_all_rays() {
+    for k in 1..10 {
+        let top = 0.7 * f64::from(k);
+        let mut world = World::default();
+        world.cuboid("low", Point::new(-5.0, -5.0, 0.0), Point::new(5.0, 5.0, top));
+        world.cuboid("high", Point::new(-5.0, -5.0, top + 1e-3), Point::new(5.0, 5.0, 9.0));
+        let results = world.run(&through_all(1.0), |_| ());
+        let power = &results.power;
+        assert_eq!(results.lost_rays, 0, "{top}: {:?}", results.ledger.first());
+        assert!((power.received - power.emitted).abs() < 1e-9 * power.emitted, "{top}: {power:?}");
+        assert!(!results.notes.iter().any(|note| note.contains("two touching faces")), "{:?}", results.notes);
+    }
 }

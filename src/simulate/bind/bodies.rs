@@ -61,7 +61,7 @@ pub(super) fn find_bodies(
         bodies[body].gap = bodies[body].gap.max(gap);
         of_face[f.id.index()] = body as u32;
     }
-    let boxes: Vec<Aabb> = bodies[1..].iter().map(|b| b.bounds.grown(scene.run.glue_mm)).collect();
+    let boxes: Vec<Aabb> = bodies[1..].iter().map(|b| b.bounds.grown(scene.run.glue_distance())).collect();
     let nested = BoxTree::meeting_pairs(&boxes).next().is_some();
     Ok((bodies, of_face, nested))
 }

@@ -13,7 +13,7 @@ use crate::simulate::trim_loops::trim_polygons;
 /// never marked.
 pub(super) fn touching_bodies(scene: &Scene, model: &Model, of_face: &[u32]) -> (Vec<bool>, Vec<[u32; 2]>) {
     // Each box is grown by half of the glue, so that two within its whole meet.
-    let boxed = |f: PlacedFace<'_>| (f.id.index(), f.bounds().grown(0.5 * scene.run.glue_mm));
+    let boxed = |f: PlacedFace<'_>| (f.id.index(), f.bounds().grown(0.5 * scene.run.glue_distance()));
     let (faces, boxes): (Vec<usize>, Vec<Aabb>) =
         model.placed_faces().filter(|f| of_face[f.id.index()] != AMBIENT).map(boxed).unzip();
     let (mut touching, mut pairs) = (vec![false; of_face.len()], Vec::new());
@@ -41,7 +41,7 @@ pub(super) fn touching_siblings(scene: &Scene, model: &Model, of_face: &[u32]) -
         .collect();
     faces.sort_by_key(|f| of_face[f.id.index()]);
     for body in faces.chunk_by(|a, b| of_face[a.id.index()] == of_face[b.id.index()]) {
-        let boxes: Vec<Aabb> = body.iter().map(|f| f.bounds().grown(0.5 * scene.run.glue_mm)).collect();
+        let boxes: Vec<Aabb> = body.iter().map(|f| f.bounds().grown(0.5 * scene.run.glue_distance())).collect();
         for meeting in BoxTree::meeting_pairs(&boxes) {
             let [a, b] = meeting.map(|k| &body[k]);
             // By boxes alone: whether the shells really touch at a point is asked where light crosses there.
@@ -68,7 +68,7 @@ pub(super) fn media_on_opaque(scene: &Scene, model: &Model, of_face: &[u32], opa
         return on_opaque;
     }
     let placed: Vec<PlacedFace<'_>> = model.placed_faces().collect();
-    let glue = scene.run.glue_mm;
+    let glue = scene.run.glue_distance();
     // Half the glue on either side makes it whole between two boxes.
     let box_of = |f: &PlacedFace<'_>| f.bounds().grown(0.5 * glue);
     let mut faces: Vec<(usize, Aabb)> = (placed.iter())

@@ -148,7 +148,7 @@ impl<'m> LuminousSearch<'m> {
 
     /// Returns the places of the opaque faces of other shells whose boxes come within the glue distance of that of an opaque face.
     fn places_against(&self, place: usize) -> Vec<usize> {
-        let glue = self.scene.run.glue_mm;
+        let glue = self.scene.run.glue_distance();
         let shell = |place: usize| (self.faces[place].instance, self.faces[place].shell);
         let mut against = Vec::new();
         // With room for rounding: of two boxes the one of the lower place is grown, whichever of both shines.
@@ -166,7 +166,7 @@ impl<'m> LuminousSearch<'m> {
 
     /// Returns an opaque face, by its place, ready to cover others, made when it is first asked for; `None` for a ready mesh.
     fn cover(&mut self, place: usize) -> Option<Arc<Cover>> {
-        let (model, glue) = (self.model, self.scene.run.glue_mm);
+        let (model, glue) = (self.model, self.scene.run.glue_distance());
         let (placed, bounds) = (self.faces[place], self.boxes[place]);
         let cover = self.covers.entry(place).or_insert_with(|| {
             let closed = placed.shell.is_some_and(|s| model.part(placed.part).shells[s].closed);

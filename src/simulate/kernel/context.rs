@@ -113,7 +113,7 @@ impl<'a> Context<'a> {
     /// Returns the distance up to which faces of two solids are one, mm.
     #[inline(always)]
     pub(super) fn glue_mm(&self) -> f64 {
-        self.bound.scene.run.glue_mm
+        self.bound.scene.run.glue_distance()
     }
 
     /// Returns the refractive index of a body at the wavelength of a ray, or of the scene where the ray carries none.

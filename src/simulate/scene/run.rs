@@ -25,6 +25,10 @@ const GLUE_MM: f64 = 1e-3;
 /// Glue distances that may be asked for, mm: from the rounding of places to what would close real gaps.
 const GLUES_MM: std::ops::RangeInclusive<f64> = 1e-9..=1.0;
 
+/// Share by which the glue distance reaches beyond what is asked, far more than places are rounded by: faces that are drawn exactly so far
+/// apart are one for every ray then, and not for those alone that rounding puts nearer.
+const GLUE_MARGIN: f64 = 1e-6;
+
 /// Most rays of a run: of one that grows, the 32 bits that number its replicates of 5000 rays hold no more.
 pub const MOST_RAYS: u64 = 20_000_000_000_000;
 
@@ -204,6 +208,16 @@ impl Accuracy {
 }
 
 impl Run {
+    /// Returns the distance up to which faces of two solids are one, mm: `glue_mm` with a margin for rounding.
+    pub(crate) fn glue_distance(&self) -> f64 {
+        self.glue_mm * (1.0 + GLUE_MARGIN)
+    }
+
+    /// Whether a value of `glue_mm` is one that may be asked for.
+    pub(crate) fn allows_glue(glue_mm: f64) -> bool {
+        GLUES_MM.contains(&glue_mm)
+    }
+
     /// Refuses the first number that is out of range.
     pub(super) fn check(&self, origin: &Origin) -> Result<(), Error> {
         let fail = |key: &str, message: &str| {
@@ -218,7 +232,7 @@ impl Run {
             r if !WAVELENGTHS_NM.contains(&r.wavelength_nm) => {
                 fail("wavelength_nm", "must be from 1 to 1e6 nm; 0.55 µm are 550 nm")
             }
-            r if !GLUES_MM.contains(&r.glue_mm) => {
+            r if !Self::allows_glue(r.glue_mm) => {
                 fail("glue_mm", "must be from 1e-9 to 1: faces at the same place are always one interface")
             }
             r if r.caught_after.is_nan() || r.caught_after < 1.0 => fail("caught_after", "must be at least 1"),
