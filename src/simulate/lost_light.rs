@@ -43,7 +43,9 @@ impl BoundScene {
                 "light left the scene inside a body, by a gap between faces, an open shell or a missing face"
             }
             LostCause::ImpossibleMedium => {
-                "light came to a face from the wrong side, as through an open shell, or where a mesh is turned or bodies overlap"
+                "light came to a face from the wrong side, as through an open shell, where a mesh is turned or bodies overlap, or where \
+                 facets cross, of two faces that lie nearer to each other than the tolerance: there a finer one helps, or \
+                 `--intersector exact`"
             }
             LostCause::InsideSolid if self.lets_light_into_solid(at) => {
                 "a face of it lets light through, but what is behind has no medium, and its other faces are opaque: give the part a \

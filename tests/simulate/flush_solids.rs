@@ -2,6 +2,8 @@
 
 use crate::support::{Shape, World};
 use lampyris::math::{Frame, Point, Vector};
+use lampyris::simulate::Scene;
+use std::path::Path;
 
 const FAR: &str = "[[receiver]]\nname = 'far'\nkind = 'far_field'\nangles = 'C'\ncells = [36, 18]\n";
 

@@ -8,7 +8,7 @@ use crate::optics::{catalogue, observer_range};
 use crate::simulate::body::AMBIENT;
 use crate::simulate::emitter::Loaded;
 use crate::simulate::receiver::{Receiver, Shape};
-use crate::simulate::scene::{ByWavelength, Material, PowerUnit, Reflectance, Scene, medium};
+use crate::simulate::scene::{ByWavelength, Material, PowerUnit, Reflectance, Run, Scene, medium};
 use crate::simulate::surfaces::FaceOptics;
 use crate::simulate::wavelength_text::wavelength_range_text;
 use crate::text::{count_of, first_sentences};
@@ -20,9 +20,6 @@ const ROUNDING: f64 = 5e-7;
 
 /// Tables, media, sources and remarks on files that are named; of more the number is told.
 pub(super) const NAMED: usize = 8;
-
-/// Bodies thinner than this, mm, are flat sheets: a tenth of it is the least glue distance that a scene may have, which mends nothing then.
-const THINNEST_MM: f64 = 1e-8;
 
 /// Index beyond which the surroundings are no gas: vapours at normal pressure have up to 1.0018 (benzene).
 const MOST_OF_GAS: f64 = 1.002;
@@ -330,21 +327,25 @@ pub(super) fn ready_mesh_note(model: &Model) -> Option<String> {
     ))
 }
 
-/// Returns one sentence about the thinnest body that touches others and whose box is thinner than twice the glue distance along an axis, no
-/// flat sheet; `None` where there is none.
+/// Glue distance that is advised for the thinnest body, as a share of its thickness: both of its faces are far beyond it.
+const GLUE_OF_THICKNESS: f64 = 0.1;
+
+/// Returns one sentence about the thinnest body that touches others and whose box is thinner than twice the glue distance along an axis;
+/// `None` where there is none. A flat sheet is none: it has no thickness that a smaller glue distance could tell.
 pub(super) fn thin_body_note(bound: &BoundScene) -> Option<String> {
     let glue = bound.scene.run.glue_mm;
     let thickness = |k: u32| bound.bodies[k as usize].bounds.size().min_element();
     let touching: BTreeSet<u32> = bound.faces.iter().filter(|f| f.touches_body).map(|f| f.body).collect();
     // Twice the glue: a body as thin as that has both of its faces within the glue of one place.
-    let thin = touching.into_iter().filter(|&k| k != AMBIENT && (THINNEST_MM..2.0 * glue).contains(&thickness(k)));
+    let is_thin = |k: u32| thickness(k) < 2.0 * glue && Run::allows_glue(GLUE_OF_THICKNESS * thickness(k));
+    let thin = touching.into_iter().filter(|&k| k != AMBIENT && is_thin(k));
     let film = thin.min_by(|a, b| thickness(*a).total_cmp(&thickness(*b)))?;
     let [name, medium] = bound.body_names(film)?;
     let thick = thickness(film);
     Some(format!(
         "'{name}' ({medium}) is {thick:.1e} mm thick, hardly more than [run] glue_mm = {glue:e}, within which faces of touching bodies \
          are one: light may pass it by or be lost; set glue_mm to {:.0e}",
-        0.1 * thick
+        GLUE_OF_THICKNESS * thick
     ))
 }
 
