@@ -265,3 +265,20 @@ fn a_far_field_of_millions_of_cells_has_results_and_no_sure_verdict() {
     assert_eq!(code, 0, "{err}");
     is_unsure(&serde_json::from_str(&out).unwrap());
 }
+
+/// A device may have no end, nor a pipe: neither is read, as results or as the far field that they name.
+#[cfg(unix)]
+#[test]
+fn assess_reads_ordinary_files_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let road = serde_json::json!({"name": "road", "kind": "far_field", "angles": "A", "unit": "cd",
+        "files": ["road.csv"]});
+    let results = serde_json::json!({"rays": 1000, "receivers": [road]});
+    fs::write(path.join("results.json"), results.to_string()).unwrap();
+    std::os::unix::fs::symlink("/dev/null", path.join("road.csv")).unwrap();
+    for given in ["/dev/null", "."] {
+        let (code, _, err) = lampyris_in(path, &["assess", given, "--regulation", "UN R112 B passing"]);
+        assert!(code == 3 && err.contains("it is a pipe or a device"), "{given}: {code} {err}");
+    }
+}

@@ -5,6 +5,7 @@ use crate::cli::output::json::json_text;
 use crate::cli::output::verdict::summary;
 use crate::cli::work::output_place::folder_of;
 use crate::cli::{completion::Completion, failure::Failure};
+use crate::formats::read_text;
 use crate::regulation::{Assumptions, IntensityMap, RaySample, Regulation, Traffic, assess};
 use crate::text::nearest_or_listed;
 use serde_json::{Value, json};
@@ -84,7 +85,7 @@ impl ResultsFile {
         let path = if given.is_dir() { given.join("results.json") } else { given.to_owned() };
         let help = "give the folder that `lampyris trace` wrote, or its results.json";
         let failure = |what: String| Failure::input(format!("{}: {what}", path.display())).with_help(help);
-        let text = std::fs::read_to_string(&path).map_err(|e| failure(format!("cannot read: {e}")))?;
+        let text = read_text(&path).map_err(|e| failure(format!("cannot read: {e}")))?;
         let results: Value =
             serde_json::from_str(&text).map_err(|e| failure(format!("not the results of a run: {e}")))?;
         let folder = folder_of(&path);
@@ -154,7 +155,7 @@ impl ResultsFile {
         })?;
         let path = self.folder.join(csv);
         let failure = |what: String| Failure::input(format!("{}: {what}", path.display()));
-        let text = std::fs::read_to_string(&path).map_err(|e| failure(format!("cannot read: {e}")))?;
+        let text = read_text(&path).map_err(|e| failure(format!("cannot read: {e}")))?;
         // Results of earlier versions do not say.
         let heaviest = self.results["heaviest_ray"].as_f64();
         let replicates = self.results["replicates"].as_u64().and_then(|n| u32::try_from(n).ok());
