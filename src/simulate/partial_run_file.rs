@@ -18,6 +18,8 @@ use std::io::{self, Write};
 
 /// Begins a file of this version.
 const MAGIC: &[u8] = b"lampyris tally 11\n";
+/// Bytes of the checksum that ends it.
+const CHECKSUM_BYTES: usize = 16;
 
 impl PartialRun {
     /// Writes the file, with a header of the caller's, as one block with a checksum.
@@ -104,6 +106,11 @@ impl PartialRun {
     pub fn header<H: DeserializeOwned>(bytes: &[u8]) -> Result<H, String> {
         open_tally_file(bytes).map(|(header, _)| header)
     }
+
+    /// Whether these bytes begin such a file and do not end it: it is still being copied, or damaged.
+    pub fn is_cut_short(bytes: &[u8]) -> bool {
+        MAGIC.starts_with(bytes) || (bytes.starts_with(MAGIC) && !ends_in_checksum(bytes))
+    }
 }
 
 /// Returns the bits of each coordinate.
@@ -134,14 +141,23 @@ fn append_sums(out: &mut Vec<u8>, sums: &[Sum]) {
 /// # Errors
 /// When the bytes are no such file or are damaged.
 fn open_tally_file<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Reader<'_>), String> {
+    if MAGIC.starts_with(bytes) {
+        return Err("the file is cut short".into());
+    }
     let rest = bytes.strip_prefix(MAGIC).ok_or("not a tally file of this version")?;
-    let (rest, sum) = rest.split_last_chunk::<16>().ok_or("the file is cut short")?;
-    if Fnv::hash(&[&bytes[..bytes.len() - 16]]) != u128::from_le_bytes(*sum) {
+    let (rest, _) = rest.split_last_chunk::<CHECKSUM_BYTES>().ok_or("the file is cut short")?;
+    if !ends_in_checksum(bytes) {
         return Err("the file is damaged or cut short: its checksum is wrong".into());
     }
     let mut reader = Reader { bytes: rest, sums_left: None };
     let header = reader.json()?;
     Ok((header, reader))
+}
+
+/// Whether the last bytes are the checksum of all that stand before them.
+fn ends_in_checksum(bytes: &[u8]) -> bool {
+    let ending = bytes.split_last_chunk::<CHECKSUM_BYTES>();
+    ending.is_some_and(|(before, sum)| Fnv::hash(&[before]) == u128::from_le_bytes(*sum))
 }
 
 /// Most sums of a part that is read for no scene: twice what the receivers of one may have, 2 GB.

@@ -270,3 +270,28 @@ fn the_case_of_an_extension_does_not_hide_a_part() {
     trace(path, &["-o", "whole"]);
     assert_same(path, "whole", "merged");
 }
+
+/// A part that is still being copied from elsewhere is waited for, the first of all and a later one; but not without end.
+#[test]
+fn merge_waits_for_the_end_of_a_part() {
+    let folder = lens("20_000");
+    let path = folder.path();
+    for shard in ["1/2", "2/2"] {
+        trace(path, &["--shard", shard, "-o", "parts"]);
+    }
+    for k in [1, 2] {
+        let part = path.join(format!("parts/shard-{k}-of-2.tally"));
+        let whole = std::fs::read(&part).unwrap();
+        std::fs::write(&part, &whole[..whole.len() / 2]).unwrap();
+        let (code, _, err) = lampyris_in(path, &["merge", "parts", "-o", "no", "--wait", "0.1"]);
+        assert!(code == 3 && err.contains("cut short"), "{k}: {code} {err}");
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                // Long enough for the merge to have found the half.
+                std::thread::sleep(std::time::Duration::from_secs(2));
+                std::fs::write(&part, &whole).unwrap();
+            });
+            merge(path, &["parts", "--wait", "120"], &format!("out-{k}"));
+        });
+    }
+}

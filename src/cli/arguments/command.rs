@@ -114,7 +114,7 @@ pub(crate) enum Command {
         /// The scene, where it is no longer at the place that the parts name
         #[arg(long, value_name = "FILE")]
         scene: Option<PathBuf>,
-        /// Seconds to wait for parts that are still missing
+        /// Seconds to wait for parts that are still missing, or still being copied
         #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true)]
         wait: Option<f64>,
         /// Rays of the whole run, where further ranges of a run that grows are still to come

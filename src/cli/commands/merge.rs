@@ -11,7 +11,7 @@ use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, SavePlace, saved_header};
 use crate::cli::work::input_guard::InputGuard;
 use crate::cli::work::output_place::{OutputPlace, try_claim, try_folder};
-use crate::cli::work::part_sum::{AskedRun, PartOrigins, PartSum, input_failure, read_part};
+use crate::cli::work::part_sum::{AskedRun, PartFailure, PartOrigins, PartSum, input_failure, read_header};
 use crate::cli::work::results_folder::RunRemarks;
 use crate::cli::work::run_commands::RunCommands;
 use crate::cli::work::shards::is_tally;
@@ -52,8 +52,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     let parts = part_files(command.parts)?;
     InputGuard::new(parts.iter().map(PathBuf::as_path)).refuse("-o", command.folder)?;
     let monitor = TerminalMonitor::of_traced(console);
-    let first = first_part(command, &patience, console)?;
-    let header: TallyHeader = PartialRun::header(&read_part(&first)?).map_err(|m| input_failure(&first, m))?;
+    let header = first_header(command, &patience, console)?;
     // The part knows where its scene was.
     let scene_path = command.scene.map_or_else(|| header.scene(), Path::to_path_buf);
     let cache = cache_folder::cache(command.cache)?;
@@ -141,7 +140,13 @@ fn sum_parts(
     });
     // Listed anew each time: parts may come, and grow, while they are waited for.
     loop {
-        let there = sum.add_new(&part_files(command.parts)?, &prepared.bound)?;
+        let there = match sum.add_new(&part_files(command.parts)?, &prepared.bound) {
+            Ok(there) => there,
+            Err(failure) => {
+                patience.wait_for_end(failure, console)?;
+                continue;
+            }
+        };
         if there.is_whole() || !patience.wait_again(console, &missing_parts(there, header)) {
             return Ok(sum.into_total());
         }
@@ -200,15 +205,24 @@ impl Patience {
         std::thread::sleep(LOOK_AGAIN);
         true
     }
+
+    /// Waits [`LOOK_AGAIN`] for the end of a part that is cut short; fails where waiting changes nothing, and when the time is over.
+    fn wait_for_end(&self, failure: PartFailure, console: &Console) -> Result<(), Failure> {
+        match failure {
+            PartFailure::CutShort(failure) if self.wait_again(console, &failure.to_string()) => Ok(()),
+            PartFailure::CutShort(failure) | PartFailure::Lasting(failure) => Err(failure),
+        }
+    }
 }
 
-/// Returns the first part that is there, waited for where that was asked; fails when none came in time.
-fn first_part(command: &MergeCommand, patience: &Patience, console: &Console) -> Result<PathBuf, Failure> {
+/// Returns the header of the first part that is there, waited for where that was asked; fails when none came in time.
+fn first_header(command: &MergeCommand, patience: &Patience, console: &Console) -> Result<TallyHeader, Failure> {
     loop {
         // Listed anew each time: parts appear in the folder.
         let files = part_files(command.parts)?;
-        match files.into_iter().find(|file| file.exists()) {
-            Some(file) => return Ok(file),
+        match files.iter().find(|file| file.exists()).map(|file| read_header(file)) {
+            Some(Ok(header)) => return Ok(header),
+            Some(Err(failure)) => patience.wait_for_end(failure, console)?,
             None if patience.wait_again(console, "no part is there yet") => {}
             None => return Err(no_part(command.parts)),
         }

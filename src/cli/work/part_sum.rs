@@ -35,6 +35,29 @@ pub(crate) struct AskedRun {
     pub(crate) rays: Option<u64>,
 }
 
+/// Why a part cannot be added to the others.
+#[derive(Debug)]
+pub(crate) enum PartFailure {
+    /// Its file has no end, as while it is still being copied.
+    CutShort(Failure),
+    /// Waiting changes nothing.
+    Lasting(Failure),
+}
+
+impl PartFailure {
+    /// Returns the failure of a file of these bytes.
+    fn new(path: &Path, bytes: &[u8], message: String) -> Self {
+        let failure = input_failure(path, message);
+        if PartialRun::is_cut_short(bytes) { Self::CutShort(failure) } else { Self::Lasting(failure) }
+    }
+}
+
+impl From<Failure> for PartFailure {
+    fn from(failure: Failure) -> Self {
+        Self::Lasting(failure)
+    }
+}
+
 /// What made the parts of a sum.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PartOrigins {
@@ -72,7 +95,7 @@ impl PartSum {
     /// # Errors
     /// When there is no file, one cannot be read, is of another run or holds what another one does, or the parts reach beyond the rays that
     /// were asked for.
-    pub(crate) fn add_new(&mut self, files: &[PathBuf], bound: &BoundScene) -> Result<&PartialRun, Failure> {
+    pub(crate) fn add_new(&mut self, files: &[PathBuf], bound: &BoundScene) -> Result<&PartialRun, PartFailure> {
         // Before they are read: what is written meanwhile is seen the next time.
         let stamped: Vec<(&PathBuf, Option<Stamp>)> = files.iter().map(|file| (file, Stamp::new(file))).collect();
         let present: BTreeMap<&PathBuf, Option<Stamp>> = stamped.iter().copied().collect();
@@ -94,7 +117,7 @@ impl PartSum {
             self.files.insert(file.clone(), stamp);
         }
         if self.files.is_empty() {
-            return Err(Failure::arguments("merge: no parts given"));
+            return Err(Failure::arguments("merge: no parts given").into());
         }
         self.reach_asked_rays()?;
         Ok(&self.total)
@@ -106,13 +129,15 @@ impl PartSum {
     }
 
     /// Reads a part, and what made it.
-    fn read(&self, path: &Path, bound: &BoundScene) -> Result<(PartialRun, PartOrigins), Failure> {
+    fn read(&self, path: &Path, bound: &BoundScene) -> Result<(PartialRun, PartOrigins), PartFailure> {
         let mut origins = PartOrigins::default();
         let check = |header: &TallyHeader| {
             origins = PartOrigins { usage: header.usage.clone(), traced_by: header.commands.tracers() };
             self.check(header)
         };
-        let part = PartialRun::read(&read_part(path)?, check, bound).map_err(|m| input_failure(path, m))?;
+        let bytes = read_part(path)?;
+        let part =
+            PartialRun::read(&bytes, check, bound).map_err(|message| PartFailure::new(path, &bytes, message))?;
         Ok((part, origins))
     }
 
@@ -184,8 +209,14 @@ pub(crate) fn input_failure(path: &Path, message: impl std::fmt::Display) -> Fai
     Failure::input(format!("{}: {message}", path.display()))
 }
 
+/// Returns the header of a part.
+pub(crate) fn read_header(path: &Path) -> Result<TallyHeader, PartFailure> {
+    let bytes = read_part(path)?;
+    PartialRun::header(&bytes).map_err(|message| PartFailure::new(path, &bytes, message))
+}
+
 /// Returns the bytes of a part.
-pub(crate) fn read_part(path: &Path) -> Result<Vec<u8>, Failure> {
+fn read_part(path: &Path) -> Result<Vec<u8>, Failure> {
     crate::formats::read_bytes(path).map_err(|e| input_failure(path, e))
 }
 
@@ -259,6 +290,17 @@ mod tests {
         // One that is gone is no longer in the sum, and one that has changed is read.
         assert_eq!(done(&mut sum, &files[1..]).ok(), Some(vec![1]));
         assert!(done(&mut sum, &files).is_err());
+        // One that is still being copied may be waited for; what is no part of a run is none later either.
+        let whole = std::fs::read(&files[1]).unwrap();
+        let of_part = |bytes: &[u8]| {
+            let file = folder.path().join("c.tally");
+            std::fs::write(&file, bytes).unwrap();
+            read_header(&file)
+        };
+        for length in [0, 5, 40, whole.len() - 1] {
+            assert!(matches!(of_part(&whole[..length]), Err(PartFailure::CutShort(_))), "{length}");
+        }
+        assert!(matches!(of_part(b"a text"), Err(PartFailure::Lasting(_))) && of_part(&whole).is_ok());
         // The same file twice would count its rays twice.
         let twice = [files[1].clone(), files[1].clone()];
         assert!(PartSum::new(AskedRun { rays: None, ..sum.asked }).add_new(&twice, &bound).is_err());
