@@ -317,6 +317,22 @@ fn products_in_a_circle_are_told() {
     assert!(problems.iter().any(|p| p.ends_with("products contain each other")), "{problems:?}");
 }
 
+/// A part stands once, and the mapped item that would show it in itself is told, as its own or by way of another representation.
+#[test]
+fn representations_in_a_circle_are_told() {
+    let part = product(100, "part", 110)
+        + "#110=SHAPE_REPRESENTATION('',(#24,#31,#20),#1);\n#31=MAPPED_ITEM('',#30,#21);\n";
+    let direct = "#30=REPRESENTATION_MAP(#20,#110);\n";
+    let indirect = "#30=REPRESENTATION_MAP(#20,#120);\n#120=SHAPE_REPRESENTATION('',(#33,#20),#1);\n\
+        #32=REPRESENTATION_MAP(#20,#110);\n#33=MAPPED_ITEM('',#32,#21);\n";
+    for (maps, item) in [(direct, 31), (indirect, 33)] {
+        let import = read(&format!("{part}{maps}"));
+        assert_eq!(import.model.instances.len(), 1, "{maps}");
+        let told = format!("#{item}: this MAPPED_ITEM shows #110 in itself; that is left out");
+        assert_eq!(import.report.problems, [told], "{maps}");
+    }
+}
+
 /// So many products that each use all the others, each with a block of its own.
 fn knot(products: u32) -> String {
     let mut data = String::new();

@@ -302,8 +302,14 @@ impl Walk<'_, '_> {
     ) -> bool {
         let id = visit.representation;
         // A few lines can name a million instances: the limit is on visits, not on depth alone.
-        let exhausted = !self.is_within_limit(visit.owners.len());
-        if exhausted || self.by_products.contains(&id) || around.iter().any(|o| o.visit.representation == id) {
+        if !self.is_within_limit(visit.owners.len()) || self.by_products.contains(&id) {
+            return false;
+        }
+        if around.iter().any(|outer| outer.visit.representation == id) {
+            // Relationships are met from both ends: one that leads back leaves nothing out.
+            if let Some(item) = visit.owners.last().filter(|_| !visit.is_linked) {
+                self.tell(*item, format!("this MAPPED_ITEM shows #{id} in itself; that is left out"));
+            }
             return false;
         }
         if around.len() >= MAX_DEPTH {
@@ -329,8 +335,7 @@ impl Walk<'_, '_> {
             return false;
         }
         if self.reached.insert(id) && self.assembly.item_list(id).is_some_and(|list| list.refs().is_none()) {
-            let problem = format!("#{id}: an entry of its list of items is no reference; it is left out");
-            self.assembly.problems.push(problem);
+            self.tell(id, "an entry of its list of items is no reference; it is left out".into());
         }
         if visit.is_shown {
             let file = self.assembly.file;
@@ -367,8 +372,7 @@ impl Walk<'_, '_> {
         };
         let owners = [&outer.owners[..], &[item]].concat().into();
         let place = outer.place.inner(&local);
-        let Visit { product, is_shown, .. } = *outer;
-        Some(Visit { representation: link.to, place, owners, product, is_shown, is_linked: false })
+        Some(Visit { representation: link.to, place, owners, is_linked: false, ..*outer })
     }
 
     /// Returns the visit of what a relationship of a placed representation leads to; one whose place cannot be read is reached, but not
