@@ -32,6 +32,11 @@ fn a_scene_is_made_for_a_file_and_can_be_traced_at_once() {
     // Nor under a name that `trace` would take for a STEP file.
     let (code, _, err) = lampyris_in(path, &["init", "my lens.stp", "-o", "other.stp"]);
     assert!(code == 2 && err.contains("-o other.toml") && !path.join("other.stp").exists(), "{err}");
+    // A folder is no name.
+    for (given, named) in [(".", "-o './my lens.toml'"), ("a/b", "-o 'a/b/my lens.toml'")] {
+        let (code, _, err) = lampyris_in(path, &["init", "my lens.stp", "-o", given]);
+        assert!(code == 2 && err.contains(named), "{code} {err}");
+    }
     assert_eq!(lampyris_in(path, &["trace", "a/b/s.toml", "--dry-run"]).0, 0);
 }
 

@@ -36,14 +36,14 @@ pub(crate) fn run(
     placed: PlacedLimit,
     console: &Console,
 ) -> Result<Completion, Failure> {
-    let scene_file = match output {
-        Some(path) => path.to_path_buf(),
-        None => PathBuf::from(last_component(file)).with_extension("toml"),
-    };
+    let usual_name = PathBuf::from(last_component(file)).with_extension("toml");
+    let scene_file = output.unwrap_or(&usual_name).to_path_buf();
     // Whoever reads the file goes by the end of its name.
     if lower_extension(&scene_file) != "toml" {
         let failure = Failure::arguments(format!("-o {}: the name of a scene ends in .toml", scene_file.display()));
-        return Err(failure.with_help(format!("write -o {}", scene_file.with_extension("toml").display())));
+        let is_folder = scene_file.is_dir() || scene_file.file_name().is_none();
+        let named = if is_folder { scene_file.join(&usual_name) } else { scene_file.with_extension("toml") };
+        return Err(failure.with_help(format!("write -o {}", shell_word(&named.display().to_string()))));
     }
     let loaded = input_files::model_file(file, placed, console)?;
     // A scene has work in it: it is never written over.
