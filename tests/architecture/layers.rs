@@ -816,12 +816,12 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         &[
             "lenient",
             "strict",
-            "conditions",
             "locate",
             "origin",
             "selector",
             "run",
             "receiver",
+            "conditions",
             "spectrum",
             "source",
             "medium",

@@ -30,6 +30,8 @@ mod ready_meshes;
 mod refusals;
 mod repairs;
 mod scenes;
+#[cfg(feature = "schema")]
+mod schema_ranges;
 mod selectors;
 mod sequences;
 mod sources;

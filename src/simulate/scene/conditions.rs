@@ -1,9 +1,10 @@
 //! What the JSON Schema says of keys that go together, beside the types that it reads off the structs: what an editor can show before
 //! the command does. Whatever it refuses the reader of scenes refuses too; not the other way round.
 
-use super::lenient::LARGEST_COUNT;
+use super::MOST_RAYS;
+use super::receiver::LENGTHS_MM;
 use crate::model::SurfaceKind;
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use crate::tessellate::LEAST_TOLERANCE_MM;
 use serde_json::{Value, json};
 
 /// Adds the conditions to the JSON Schema of a scene, in place.
@@ -69,10 +70,38 @@ pub(super) fn add_conditions(schema: &mut Value) {
         // The schema's own definitions stand under the names of the structs.
         merge(&mut schema["$defs"][name], &more);
     }
+    for (name, key, range) in open_ranges() {
+        merge(&mut schema["$defs"][name]["properties"][key], &range);
+    }
     for direction in ["direction", "normal"] {
         let owner = if direction == "normal" { "Receiver" } else { "Source" };
         schema["$defs"][owner]["properties"][direction]["not"] = json!({"const": [0, 0, 0]});
     }
+}
+
+/// Returns the ranges of numbers that have an open end, are written in several forms or stand in pairs, each with the struct and the key
+/// that it belongs to.
+fn open_ranges() -> [(&'static str, &'static str, Value); 13] {
+    let positive = json!({"exclusiveMinimum": 0});
+    let length = json!({"minimum": LENGTHS_MM.start(), "maximum": LENGTHS_MM.end()});
+    let rays = json!({"minimum": 1, "maximum": MOST_RAYS});
+    let least = json!({"minimum": LEAST_TOLERANCE_MM});
+    [
+        // Each bound is asked of the form that it fits.
+        ("Accuracy", "tolerance_mm", json!({"minimum": LEAST_TOLERANCE_MM, "items": least})),
+        ("Run", "rays", rays.clone()),
+        ("Run", "max_length_mm", positive.clone()),
+        ("Run", "power_floor", json!({"exclusiveMaximum": 1})),
+        ("Medium", "absorption_per_mm", json!({"minimum": 0})),
+        ("Medium", "anisotropy", json!({"exclusiveMinimum": -1, "exclusiveMaximum": 1})),
+        ("ScatterKey", "sigma_deg", positive.clone()),
+        ("Source", "rays", rays),
+        ("Source", "radius", positive.clone()),
+        ("Source", "size", json!({"items": positive})),
+        ("Source", "half_angle_deg", positive.clone()),
+        ("SpectrumKey", "kelvin", positive),
+        ("Receiver", "size", json!({"items": length})),
+    ]
 }
 
 /// Returns what a schema says of a kind of surface, or of each of a list: one of the words, or a pattern with a star.
@@ -98,15 +127,4 @@ fn merge(into: &mut Value, more: &Value) {
         }
         (into, more) => *into = more.clone(),
     }
-}
-
-/// Returns what a schema says of a whole number that may be written as `1e6`.
-pub(super) fn count_schema(_: &mut SchemaGenerator) -> Schema {
-    json_schema!({"type": "number", "multipleOf": 1, "minimum": 0, "maximum": LARGEST_COUNT})
-}
-
-/// Returns what a schema says of two numbers, or one for both.
-pub(super) fn range_schema(generator: &mut SchemaGenerator) -> Schema {
-    let two = <[f64; 2]>::json_schema(generator);
-    json_schema!({"anyOf": [{"type": "number"}, two]})
 }

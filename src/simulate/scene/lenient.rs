@@ -5,7 +5,7 @@ use serde::de::{Error, SeqAccess, Unexpected, Visitor};
 use std::fmt;
 
 /// Whole numbers up to this one are exact where they are written as `1e6`: just below 2⁵³.
-pub(super) const LARGEST_COUNT: f64 = 9e15;
+const LARGEST_COUNT: f64 = 9e15;
 
 /// Reads a whole number from 0, which may be written as `1e6`; such a one must be below [`LARGEST_COUNT`].
 pub(super) fn count<'de, D: Deserializer<'de>>(d: D) -> Result<u64, D::Error> {
@@ -20,6 +20,19 @@ pub(super) fn optional_count<'de, D: Deserializer<'de>>(d: D) -> Result<Option<u
 /// Reads two numbers, or one for both; their order and sign are not looked at.
 pub(super) fn range<'de, D: Deserializer<'de>>(d: D) -> Result<Option<[f64; 2]>, D::Error> {
     d.deserialize_any(Range).map(Some)
+}
+
+/// Returns what a schema says of what [`count`] reads.
+#[cfg(feature = "schema")]
+pub(super) fn count_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+    schemars::json_schema!({"type": "number", "multipleOf": 1, "minimum": 0, "maximum": LARGEST_COUNT})
+}
+
+/// Returns what a schema says of what [`range`] reads.
+#[cfg(feature = "schema")]
+pub(super) fn range_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+    let two = <[f64; 2] as schemars::JsonSchema>::json_schema(generator);
+    schemars::json_schema!({"anyOf": [{"type": "number"}, two]})
 }
 
 /// Reads a whole number.

@@ -15,6 +15,7 @@ pub struct ModelUse {
     /// Put before the names of its instances, as `name/instance`, when several models are used.
     pub name: String,
     /// Millimetres per length unit of the file, for files whose unit is wrong; the file's own unit otherwise.
+    #[cfg_attr(feature = "schema", schemars(range(min = 1e-9, max = 1e6)))]
     pub unit_mm: Option<f64>,
     /// Most products and shapes that the file's assemblies may place; beyond it the file is refused. A million unless given.
     pub max_placed: Option<u64>,
@@ -76,6 +77,7 @@ pub struct Placement {
     /// Where the file's x axis points, as far as `z` lets it; the scene's x axis unless given.
     pub x: Option<[f64; 3]>,
     /// Enlargement, above 0.
+    #[cfg_attr(feature = "schema", schemars(range(min = 1e-9, max = 1e6)))]
     pub scale: f64,
 }
 
@@ -146,6 +148,7 @@ pub struct ScatterKey {
     /// Standard deviation of a Gaussian lobe in each direction, degrees.
     pub sigma_deg: Option<f64>,
     /// Exponent of a cosine lobe about the specular direction.
+    #[cfg_attr(feature = "schema", schemars(range(min = 0)))]
     pub exponent: Option<f64>,
     /// `[A, B, g]` of an ABg lobe, which says itself how much it scatters.
     pub abg: Option<[f64; 3]>,

@@ -40,7 +40,6 @@ pub struct Medium {
     #[cfg_attr(feature = "schema", schemars(range(min = 0, max = 10_000)))]
     pub scatter_per_mm: Option<f64>,
     /// Mean cosine of the scattering angle (Henyey and Greenstein's g), in (−1, 1).
-    #[cfg_attr(feature = "schema", schemars(range(min = -1, max = 1)))]
     pub anisotropy: Option<f64>,
 }
 

@@ -6,7 +6,7 @@ use crate::simulate::{Error, ErrorKind};
 use serde::{Deserialize, Serialize};
 
 /// Sizes and radii of receivers, mm: the area of a cell is a number that figures can be divided by, from atoms to the orbit of the moon.
-const LENGTHS_MM: std::ops::RangeInclusive<f64> = 1e-9..=1e12;
+pub(super) const LENGTHS_MM: std::ops::RangeInclusive<f64> = 1e-9..=1e12;
 
 /// Where light is counted. Planes, discs and spheres stand in space and are no part of a model.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -32,7 +32,7 @@ pub struct Receiver {
     /// Sides of a plane, mm; a `frame` that enlarges moves the receiver and leaves them.
     pub size: Option<[f64; 2]>,
     /// Radius of a disc or sphere, mm; a `frame` that enlarges moves the receiver and leaves it.
-    #[cfg_attr(feature = "schema", schemars(range(min = 0)))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 1e-9, max = 1e12)))]
     pub radius: Option<f64>,
     /// Number of cells along both sides; of a disc along those of the square around it, whose corners stay empty.
     #[cfg_attr(feature = "schema", schemars(inner(range(min = 1))))]
@@ -55,6 +55,7 @@ pub struct Receiver {
     /// What is counted besides power, where that is in watts.
     pub channels: Option<Channels>,
     /// Edges of spectral bins, rising, nm: power is counted in each. Not beside `channels`, which another receiver there may have.
+    #[cfg_attr(feature = "schema", schemars(length(min = 2, max = 1000)))]
     pub bins_nm: Option<Vec<f64>>,
     /// Part whose absorbed flux is counted.
     pub part: Option<OneOrMany<String>>,

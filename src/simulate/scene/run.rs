@@ -39,7 +39,7 @@ pub const MOST_RAYS: u64 = 20_000_000_000_000;
 pub struct Run {
     /// Number of rays that leave the sources, such as 1_000_000 or 1e6.
     #[serde(deserialize_with = "lenient::count")]
-    #[cfg_attr(feature = "schema", schemars(schema_with = "super::conditions::count_schema"))]
+    #[cfg_attr(feature = "schema", schemars(schema_with = "super::lenient::count_schema"))]
     pub rays: u64,
     /// Seed of all random numbers. Two variants of a scene with the same seed use the same random numbers, so that their difference is less
     /// noisy than with two seeds, the more so the less they differ; for a result that is independent of an earlier one, take another seed.
@@ -164,7 +164,7 @@ pub enum Interfaces {
 pub struct Accuracy {
     /// Smallest and largest sag of a facet, mm; one number for both.
     #[serde(deserialize_with = "lenient::range")]
-    #[cfg_attr(feature = "schema", schemars(schema_with = "super::conditions::range_schema"))]
+    #[cfg_attr(feature = "schema", schemars(schema_with = "super::lenient::range_schema"))]
     pub tolerance_mm: Option<[f64; 2]>,
     /// Largest angle between a facet and the surface normals at its corners, degrees; no limit unless given.
     pub angle_deg: Option<f64>,

@@ -49,12 +49,11 @@ pub struct Source {
     /// `direction` too, see `file`.
     pub x: Option<[f64; 3]>,
     /// Radius of a disc, mm; a `frame` that enlarges moves the source and leaves it.
-    #[cfg_attr(feature = "schema", schemars(range(min = 0)))]
     pub radius: Option<f64>,
     /// Sides of a rectangle, mm.
     pub size: Option<[f64; 2]>,
     /// Half the opening angle of a cone, degrees.
-    #[cfg_attr(feature = "schema", schemars(range(min = 0, max = 180)))]
+    #[cfg_attr(feature = "schema", schemars(range(max = 180)))]
     pub half_angle_deg: Option<f64>,
     /// Exponent n of a cosⁿ lobe.
     #[cfg_attr(feature = "schema", schemars(range(min = 0, max = 1e6)))]
@@ -70,7 +69,7 @@ pub struct Source {
     pub polarised: Option<[f64; 3]>,
     /// Number of its rays, which `--rays` does not change; by its share of the power otherwise.
     #[serde(deserialize_with = "lenient::optional_count")]
-    #[cfg_attr(feature = "schema", schemars(schema_with = "super::conditions::count_schema"))]
+    #[cfg_attr(feature = "schema", schemars(schema_with = "super::lenient::count_schema"))]
     pub rays: Option<u64>,
 }
 
