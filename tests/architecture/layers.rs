@@ -755,6 +755,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "frames",
             "flush_receivers",
             "overlapping_receivers",
+            "doubled_solids",
             "face_rules",
             "rule_table",
             "materials",

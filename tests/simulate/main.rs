@@ -4,6 +4,7 @@ mod caught;
 mod closed;
 mod contacts;
 mod discs;
+mod doubled_solids;
 mod effects;
 mod face_power;
 mod facets;

@@ -5,6 +5,7 @@
 mod bodies;
 mod bound_scene;
 mod contacts;
+mod doubled_solids;
 mod face_rules;
 mod face_selectors;
 mod flush_receivers;
@@ -124,6 +125,7 @@ impl Scene {
         bound.notes.extend(notes::shut_body_note(&bound, &rules));
         bound.notes.extend(notes::thin_body_note(&bound));
         bound.notes.extend(notes::ready_mesh_note(model));
+        bound.notes.extend(doubled_solids::doubled_solid_notes(&bound, model));
         bound.notes.extend(flush_receivers::flush_receiver_notes(&bound, model));
         bound.notes.extend(overlapping_receivers::overlapping_receiver_notes(&bound));
         Ok(bound)
