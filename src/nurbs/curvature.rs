@@ -62,6 +62,18 @@ impl FundamentalForms {
         let length = form(self.first);
         if length > 0.0 { form(self.second) / length } else { 0.0 }
     }
+
+    /// How far the normal turns about a direction of the parameter plane, of any length, on a saddle, 1/mm: the geodesic torsion,
+    /// `√((k₁ − k)(k − k₂))`, or that of an asymptotic direction, `√(−k₁k₂)`, where it is less. 0 for a zero direction and where the surface
+    /// bends one way: there a line that is oblique to the principal directions has torsion too, but facets along these have none.
+    pub(crate) fn saddle_torsion(&self, d: Uv) -> f64 {
+        if d == Uv::ZERO {
+            return 0.0;
+        }
+        let ([most, least], along) = (self.principal(), self.normal_curvature(d));
+        let torsion = ((most - along) * (along - least)).max(0.0).sqrt();
+        torsion.min((-most * least).max(0.0).sqrt())
+    }
 }
 
 impl Surface {
@@ -74,7 +86,7 @@ impl Surface {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Frame;
+    use crate::math::{Frame, Homogeneous};
     use crate::nurbs::sweep;
     use std::f64::consts::PI;
 
@@ -93,6 +105,27 @@ mod tests {
                 assert!((k - e).abs() < 1e-11, "{k} {e}");
             }
             assert!((forms.normal_curvature(Uv::Y) + 1.0 / minor).abs() < 1e-11);
+            // Lines of curvature have no torsion.
+            assert!(forms.saddle_torsion(Uv::X).max(forms.saddle_torsion(Uv::Y)) < 1e-6);
         }
+    }
+
+    /// Of z = x y / c at the origin both parameter lines are straight, and the normal turns about them by 1 / c; the lines between them are
+    /// those of curvature. A tube has none of it in any direction.
+    #[test]
+    fn a_hyperbolic_paraboloid_twists_along_its_straight_lines() {
+        let c = 50.0;
+        let row = |x: f64| [0.0, 3.0].map(|y| Homogeneous::new(x, y, x * y / c, 1.0));
+        let knots = vec![0.0, 0.0, 1.0, 1.0];
+        let points = [row(0.0), row(2.0)].as_flattened().to_vec();
+        let saddle = Surface { degree: [1, 1], knots: [knots.clone(), knots], points };
+        let forms = saddle.forms(Uv::ZERO).unwrap();
+        // A step of (3, 2) in the parameters goes as far along x as along y.
+        let expected = [(Uv::X, 1.0 / c), (Uv::Y, 1.0 / c), (Uv::new(3.0, 2.0), 0.0), (Uv::ZERO, 0.0)];
+        for (direction, expected) in expected {
+            assert!((forms.saddle_torsion(direction) - expected).abs() < 1e-8, "{direction}");
+        }
+        let tube = sweep::cylinder(&Frame::IDENTITY, 4.0, [0.0, 3.0], [0.0, 10.0]);
+        assert!(tube.forms(Uv::new(1.0, 5.0)).unwrap().saddle_torsion(Uv::new(1.0, 2.0)) < 1e-6);
     }
 }

@@ -30,7 +30,9 @@ const ANGLE_STEP: f64 = 1.01;
 /// Estimates from below how many cells a face needs for its tolerance, not whole: see [`cells_of_chords`], of chords of √(8ξ / k). 1 for a
 /// plane.
 pub(super) fn expected_cells(face: &Face, surface: &FaceSurface<'_>) -> f64 {
-    cells_of_chords(face, surface, |k, tolerance| (k / (8.0 * tolerance)).sqrt())
+    cells_of_chords(face, surface, |forms, along, tolerance| {
+        (forms.normal_curvature(along).abs() / (8.0 * tolerance)).sqrt()
+    })
 }
 
 /// Returns the least angle, radians and not below the one that was `asked` for, to which a face can be held within a budget of cells: the
@@ -62,14 +64,22 @@ pub(super) fn cells_granted_for_angle(face: &Face, surface: &FaceSurface<'_>, an
         as usize
 }
 
-/// Estimates from below how many cells a face needs for an angle, radians, alone, as [`expected_cells`] does for its tolerance.
+/// Estimates from below how many cells a face needs for an angle, radians, alone, as [`expected_cells`] does for its tolerance: normals
+/// turn by twice the angle along the chord of an arc, and by the angle about a straight line of a saddle, where a facet has the normal of
+/// one end.
 fn cells_of_angle(face: &Face, surface: &FaceSurface<'_>, angle: f64) -> f64 {
-    cells_of_chords(face, surface, |k, _| k / (2.0 * angle))
+    cells_of_chords(face, surface, |forms, along, _| {
+        (0.5 * forms.normal_curvature(along).abs()).max(forms.saddle_torsion(along)) / angle
+    })
 }
 
 /// The mean over a grid of places inside a face's border, the sharpest tenth left out, of its chords along u times those along v, as many
-/// as `per_mm` says for a curvature, 1/mm, and a tolerance, mm. 1 for a plane.
-fn cells_of_chords(face: &Face, surface: &FaceSurface<'_>, per_mm: impl Fn(f64, f64) -> f64) -> f64 {
+/// as `per_mm` says for the forms there, a direction in parameters and a tolerance, mm. 1 for a plane.
+fn cells_of_chords(
+    face: &Face,
+    surface: &FaceSurface<'_>,
+    per_mm: impl Fn(&FundamentalForms, Uv, f64) -> f64,
+) -> f64 {
     if surface.affine {
         return 1.0;
     }
@@ -92,9 +102,9 @@ fn cells_of_chords(face: &Face, surface: &FaceSurface<'_>, per_mm: impl Fn(f64, 
         let d = surface.second_derivatives(uv);
         let forms = FundamentalForms::new(&d)?;
         let tolerance = surface.tolerance(uv);
-        let chords = |k: f64, length: f64| (per_mm(k.abs(), tolerance) * length).max(1.0);
-        let along_u = chords(forms.normal_curvature(Uv::X), d.du.length() * size.x);
-        let along_v = chords(forms.normal_curvature(Uv::Y), d.dv.length() * size.y);
+        let chords = |along: Uv, length: f64| (per_mm(&forms, along, tolerance) * length).max(1.0);
+        let along_u = chords(Uv::X, d.du.length() * size.x);
+        let along_v = chords(Uv::Y, d.dv.length() * size.y);
         Some(along_u * along_v).filter(|cells| cells.is_finite())
     };
     let inside = |uv: &Uv| is_inside_sides(border.iter().copied(), *uv);

@@ -96,6 +96,50 @@ fn an_angle_that_no_cell_reaches_costs_no_tolerance() {
     assert!((report.area_mm2 / area - 1.0).abs() < 1e-3, "{} {area}", report.area_mm2);
 }
 
+/// The patch z = x y / 100 + x² / 2R over 40 mm each way, with the curvature 1 / R along x, between its four sides.
+fn twisted_patch(curvature: f64) -> Model {
+    let side = 40.0;
+    // Control values of x² are 0, 0 and side².
+    let row = |x: f64, square: f64| {
+        [0.0, side].map(|y| Homogeneous::new(x, y, 0.01 * x * y + 0.5 * curvature * square, 1.0))
+    };
+    let points = [row(0.0, 0.0), row(0.5 * side, 0.0), row(side, side * side)].as_flattened().to_vec();
+    let knots = [[vec![0.0; 3], vec![1.0; 3]].concat(), vec![0.0, 0.0, 1.0, 1.0]];
+    let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Uv::from_array);
+    let chords = |k: usize| if k % 2 == 0 && curvature > 0.0 { 200 } else { 1 };
+    let sides = (0..4).map(|k| chain(chords(k), |t| corners[k].lerp(corners[(k + 1) % 4], t))).collect();
+    face(Surface { degree: [2, 1], knots, points }, &[sides])
+}
+
+/// Along the straight lines of a hyperbolic paraboloid normals turn though nothing sags: by h / c from end to end of h mm, at most, and a
+/// facet has the normal of one end, so that squares of the side c a, and no larger, keep the angle a.
+#[test]
+fn a_twisted_face_keeps_its_angle_along_straight_edges_too() {
+    let model = twisted_patch(0.0);
+    for angle in [5.0f64, 2.0] {
+        let made = tessellate(&model, &Settings { angle_deg: Some(angle), ..Settings::uniform(2.0) });
+        let report = &made.report;
+        assert_eq!(report.over_angle, Some(vec![]), "{angle}");
+        assert!(report.certified == report.facets && report.repaired.is_empty(), "{angle}");
+        let squares = (40.0 / (100.0 * angle.to_radians())).powi(2);
+        // Where the face is steep normals turn less, by 1 / 1.3; halving makes up to four of one, and a square is two triangles at most.
+        let facets = report.facets as f64;
+        assert!(facets > 0.3 * squares && facets < 8.0 * squares, "{angle}: {facets} of {squares}");
+    }
+}
+
+/// A strip that bends along x and twists about y: cut along its straight lines alone, it would have no facet within the angle, however
+/// many.
+#[test]
+fn a_strip_that_bends_and_twists_is_cut_across_too() {
+    let model = twisted_patch(0.01);
+    let settings = Settings { angle_deg: Some(5.0), ..Settings::uniform(2.0) };
+    let report = tessellate(&model, &settings).report;
+    let steep: usize = report.over_angle.unwrap().iter().map(|s| s.facets).sum();
+    assert!(report.facets > 15 && report.facets < 1000, "{}", report.facets);
+    assert!(5 * steep < report.facets, "{steep} of {}", report.facets);
+}
+
 /// A flat sheet with one sharp bump, which hides in the sharpest tenth that is left out of what is foretold: the bump is meshed for its
 /// angle as far as the budget goes, not for the tolerance alone, for which two facets do. Its steepest slope is 5 · (2/3)² = 2.2, or 66°.
 #[test]

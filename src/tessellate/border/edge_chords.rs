@@ -20,6 +20,9 @@ const UV_SLACK: f64 = 2.0;
 const HOLLOW_SLACK: f64 = 1.0;
 /// Share of a chord's length by which it may leave the curve where no facet beside it is known to need more.
 const UV_SHARE: f64 = 0.02;
+/// Share of the angle by which normals may turn about a chord: by all of it the facet beside it keeps the angle only where its third corner
+/// stands between the ends of the chord.
+const TWIST_SHARE: f64 = 0.75;
 /// The file's own gaps by which the uv chord may leave the curve further.
 const GAP_SLACK: f64 = 2.0;
 /// Where along a chord the curve is compared with it.
@@ -69,10 +72,10 @@ fn edge_tolerance(sides: &[EdgeSide<'_, '_>], denser: u32, t: f64, along: Vector
 }
 
 /// Returns the parameters, ascending and with both ends, at which an edge is divided so that its chords hold for all of its `sides`, in
-/// space and in their parameter planes. Each `denser` asks for chords half as long. A closed edge gets at least three chords, a straight
-/// one as few as one.
+/// space and in their parameter planes, and normals do not turn too far about them. Each `denser` asks for chords half as long. A closed
+/// edge gets at least three chords, a straight one as few as one.
 pub(super) fn edge_parameters(curve: &Curve, sides: &[EdgeSide<'_, '_>], denser: u32) -> Vec<f64> {
-    // A straight edge is one chord, whatever its faces ask.
+    // A straight edge sags nowhere, whatever tolerance its faces ask for.
     let t = if curve.degree == 1 && curve.points.len() == 2 {
         curve.domain().to_vec()
     } else {
@@ -84,6 +87,7 @@ pub(super) fn edge_parameters(curve: &Curve, sides: &[EdgeSide<'_, '_>], denser:
         )
     };
     let mut t = follow_in_parameters(curve, sides, denser, t);
+    follow_twist(curve, sides, &mut t);
     let (first, last) = (curve.evaluate(t[0]), curve.evaluate(t[t.len() - 1]));
     let closed = (first - last).length() <= CLOSED_CURVE + CLOSED_CURVE * curve.bounds().diagonal();
     // A closed curve of two chords would enclose nothing.
@@ -151,6 +155,32 @@ fn follow_in_parameters(curve: &Curve, sides: &[EdgeSide<'_, '_>], denser: u32, 
         })
     });
     t
+}
+
+/// Halves chords about which the normals of a face turn by more than [`TWIST_SHARE`] of its angle: those of a twisted face turn about its
+/// straight edges too. Without an angle nothing is halved.
+fn follow_twist(curve: &Curve, sides: &[EdgeSide<'_, '_>], t: &mut Vec<f64>) {
+    if sides.iter().all(|s| s.surface.affine || s.surface.field.angle.is_none()) {
+        return;
+    }
+    bisect_coarse(t, Effort::new(curve), |a, b| {
+        let length = (curve.evaluate(b) - curve.evaluate(a)).length();
+        sides.iter().any(|s| twists_too_far(s, [a, b], length))
+    });
+}
+
+/// Whether normals turn by more than [`TWIST_SHARE`] of the angle of a face about its chord between the parameters `a` and `b`, of this
+/// `length`, mm. False without an angle and for a chord too short to be divided for it.
+fn twists_too_far(side: &EdgeSide<'_, '_>, [a, b]: [f64; 2], length: f64) -> bool {
+    let FaceSurface { spline, field, affine, .. } = side.surface;
+    let Some(angle) = field.angle.filter(|_| !affine && length > field.least_of_angle()) else { return false };
+    let uv = |t: f64| side.edge_use.uv.evaluate(t);
+    let along = uv(b) - uv(a);
+    let turn = |f: f64| {
+        let d = side.surface.second_derivatives(spline.clamp(uv(a + (b - a) * f)));
+        FundamentalForms::new(&d).map_or(0.0, |forms| forms.saddle_torsion(along) * length)
+    };
+    PLACES.into_iter().any(|f| turn(f) > TWIST_SHARE * angle)
 }
 
 /// Adds to the ascending `t` the parameters at which the edge crosses sharp creases of its faces, except next to samples that are there.

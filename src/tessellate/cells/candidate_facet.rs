@@ -1,7 +1,7 @@
 //! A cell as a facet that may do: nine points of it, the better diagonal, the bound.
 
 use super::cell::Cell;
-use crate::math::{Point, Uv};
+use crate::math::{Point, Uv, Vector};
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::proof::flat_triangle::distance_to_chord;
 use crate::tessellate::proof::prover::Prover;
@@ -16,6 +16,10 @@ const FARTHEST: f64 = 2.0;
 const NEARER: f64 = 1e-9;
 /// Share by which the sags along u and v must differ to decide where a cell is cut; else its longer side is.
 const SAG_DIFFERENCE: f64 = 0.05;
+/// The same for the turns of the normals along u and v.
+const TURN_DIFFERENCE: f64 = 0.05;
+/// Width of a triangle, in shares of its longest side, below which it lies in no plane: at a pole two of its corners are one.
+const LEAST_WIDTH: f64 = 1e-9;
 /// Where a line is looked at besides its middle.
 const QUARTERS: [f64; 2] = [0.25, 0.75];
 /// Most knot spans of a line that are looked at.
@@ -135,6 +139,39 @@ impl CandidateFacet {
         parameters.into_iter().map(off).fold(0.0, f64::max)
     }
 
+    /// Whether one of the two triangles along the better diagonal lies farther than `most`, radians, from the surface normal at one of its
+    /// corners, or two normals at the cell's corners differ by twice as much. Corners without a normal are passed over.
+    pub(in crate::tessellate) fn is_steep(&self, surface: &FaceSurface<'_>, cell: Cell, most: f64) -> bool {
+        let normals = corner_normals(surface, cell);
+        let known = || normals.iter().flatten();
+        // Normals within the angle of one facet differ by twice as much at most.
+        if known().any(|a| known().any(|b| a.angle_between(*b) > 2.0 * most)) {
+            return true;
+        }
+        let (p, r) = (self.places(), self.first_corner());
+        [[0, 1, 2], [0, 2, 3]].into_iter().any(|t: [usize; 3]| {
+            let corners = t.map(|k| (k + r) % 4);
+            let [a, b, c] = corners.map(|k| p[k]);
+            let across = (b - a).cross(c - a);
+            let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+            // Which way it is turned is not asked here.
+            let off = |n: Vector| across.angle_between(n).min((-across).angle_between(n));
+            across.length() > LEAST_WIDTH * longest * longest
+                && corners.iter().filter_map(|&k| normals[k]).any(|n| off(n) > most)
+        })
+    }
+
+    /// Returns the parameter, 0 for u and 1 for v, along which the normals at the corners turn farther; `None` where one of them is
+    /// missing or they turn about as far along both.
+    pub(in crate::tessellate) fn direction_of_turn(surface: &FaceSurface<'_>, cell: Cell) -> Option<usize> {
+        let [a, b, c, d] = corner_normals(surface, cell);
+        let (a, b, c, d) = (a?, b?, c?, d?);
+        let along_u = a.angle_between(b).max(d.angle_between(c));
+        let along_v = b.angle_between(c).max(a.angle_between(d));
+        let is_clear = (along_u - along_v).abs() > TURN_DIFFERENCE * along_u.max(along_v);
+        is_clear.then_some(if along_u > along_v { 0 } else { 1 })
+    }
+
     /// Places of the corners, in the order of [`Cell::corners`].
     pub(in crate::tessellate) fn places(&self) -> [Point; 4] {
         [self.p[0][0], self.p[2][0], self.p[2][2], self.p[0][2]]
@@ -170,6 +207,12 @@ impl CandidateFacet {
         let (p, uv) = (self.places(), cell.corners());
         quad_bound(prover, &std::array::from_fn(|k| (uv[(k + r) % 4], p[(k + r) % 4])), limit)
     }
+}
+
+/// Returns the unit normals at a cell's corners, in the order of [`Cell::corners`], on creases those of its side; `None` where there is
+/// none.
+fn corner_normals(surface: &FaceSurface<'_>, cell: Cell) -> [Option<Vector>; 4] {
+    cell.corners().map(|corner| surface.normal_towards(corner, cell.center()))
 }
 
 /// Returns the middles of the knot spans that a cell crosses in direction `d`, of [`MOST_SPANS`] at most, evenly chosen; of a single span

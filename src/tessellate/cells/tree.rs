@@ -204,7 +204,10 @@ impl Tree<'_, '_> {
         }
         let (direction, at) = cut.unwrap_or_else(|| {
             let limit = if is_too_large { loosest } else { self.surface.tolerance(cell.center()) * branch.slack };
-            let d = candidate.parameter_to_halve(self.surface, cell, limit);
+            // What sags as little as it may is cut where its normals turn: a twisted strip does not sag along its rulings, however fine.
+            let is_turned = candidate.largest_sag() <= limit && self.is_over_angle(cell, &candidate, branch.slack);
+            let turning = if is_turned { CandidateFacet::direction_of_turn(self.surface, cell) } else { None };
+            let d = turning.unwrap_or_else(|| candidate.parameter_to_halve(self.surface, cell, limit));
             (d, self.cut_parameter(cell, d))
         });
         // Beside a wall that a damaged coordinate makes halves got as thin as the digits of parameters, in stacks of thousands which the
@@ -315,17 +318,16 @@ impl Tree<'_, '_> {
                 return None;
             }
         }
-        // Once tolerances have grown, angles do not matter any more.
-        let is_divided = slack == 1.0 && candidate.extent() > self.surface.field.least_of_angle();
-        if let Some(max) = self.max_angle.filter(|_| is_divided) {
-            let n: Vec<_> = cell.corners().iter().filter_map(|&c| self.surface.normal(c)).collect();
-            // Normals within the angle of one facet differ by twice as much at most.
-            let turned = n.iter().any(|a| n.iter().any(|b| a.angle_between(*b) > 2.0 * max));
-            if turned {
-                return None;
-            }
+        if self.is_over_angle(cell, candidate, slack) {
+            return None;
         }
         Some(xi)
+    }
+
+    /// Whether a cell is to be divided for the angle, which does not matter any more once tolerances have grown.
+    fn is_over_angle(&self, cell: Cell, candidate: &CandidateFacet, slack: f64) -> bool {
+        let is_divided = slack == 1.0 && candidate.extent() > self.surface.field.least_of_angle();
+        self.max_angle.is_some_and(|most| is_divided && candidate.is_steep(self.surface, cell, most))
     }
 
     /// Whether `p` lies inside the border's loops, imprinted lines not counted.
