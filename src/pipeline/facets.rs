@@ -6,7 +6,7 @@ use super::settings::MeshingSettings;
 use crate::model::{Instancing, Model};
 use crate::simulate::{BoundScene, Scene};
 use crate::tessellate::{self, GroupedFacets, Tessellation, ToleranceOverride, ToleranceScope, tessellate};
-use crate::text::nearest_or_listed;
+use crate::text::{count_of, figures, nearest_or_listed};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -121,6 +121,21 @@ pub fn tessellate_model(
 pub fn tessellate_by_part(model: &Model, settings: &tessellate::Settings, monitor: &dyn Monitor) -> GroupedFacets {
     let instancing = Instancing::new(model, settings.glue_mm).map(Arc::new);
     in_stage(monitor, Stage::Tessellating, || tessellate_groups(model, instancing.as_ref(), settings).0)
+}
+
+/// Returns a sentence about the facets that turn farther from the surface than the settings allow; `None` where none does. `model` is the
+/// one that was meshed.
+pub fn angle_note(facets: &GroupedFacets, model: &Model, settings: &tessellate::Settings) -> Option<String> {
+    let asked = settings.angle_deg?;
+    let (count, largest) = facets.facets_over_angle(model, settings)?;
+    Some(format!(
+        "{} {} farther from the surface than the angle of {}°, at most {}°; within the tolerance they may be all the same: \
+         `lampyris facet --angle` names their faces",
+        count_of(count as u64, "facet"),
+        if count == 1 { "turns" } else { "turn" },
+        figures(asked, 3),
+        figures(largest, 3)
+    ))
 }
 
 /// Makes the facets of every group of a model, or without `instancing` of the model in one piece; returns them with the seconds they took.

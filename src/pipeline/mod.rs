@@ -47,7 +47,7 @@ pub use cache::{Cache, CacheEntry, PROGRAM};
 pub use default_accuracy::is_accuracy_asked;
 pub use error::{Error, ErrorKind, Excerpt};
 pub use error_target::{ErrorTarget, TargetResult};
-pub use facets::{mesh_settings, tessellate_by_part, tessellate_model};
+pub use facets::{angle_note, mesh_settings, tessellate_by_part, tessellate_model};
 pub use growing_search::{GrowingSearch, RunKeeper, Unkept};
 pub use intersectors::{IntersectorChoice, in_one_scene, refuse_facet_normals, with_intersector};
 pub use loading::{LoadedModel, read_cached_scene, read_models, read_scene, read_scene_models, step_settings};

@@ -4,7 +4,7 @@ use super::cache::{CachedFacets, group_keys};
 use super::default_accuracy::{self, OpenRun, is_accuracy_asked};
 use super::error::Error;
 use super::expected_facets::expected_facets;
-use super::facets::mesh_settings;
+use super::facets::{angle_note, mesh_settings};
 use super::fingerprint::run_fingerprint;
 use super::intersectors::{self, IntersectorChoice, TrueSurface, farthest_start, refuse_facet_normals};
 use super::loading::LoadedModel;
@@ -133,6 +133,10 @@ impl PreparedScene {
             prepared.choose_and_make_facets(instancing.as_ref(), monitor);
         } else {
             prepared.make_facets(instancing.as_ref(), monitor);
+        }
+        if prepared.choice.intersector != IntersectorKind::Exact {
+            let note = angle_note(&prepared.facets, &prepared.job.loaded.model, &prepared.mesh_settings);
+            prepared.bound.notes.extend(note);
         }
         Ok(prepared)
     }

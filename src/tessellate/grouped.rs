@@ -1,5 +1,6 @@
 //! Facets of a model whose parts that are placed often have coordinates of their own: each group is meshed by itself, once.
 
+use super::angles::steep_faces;
 use super::extent::has_no_area;
 use super::settings::{Settings, ToleranceScope};
 use super::tessellation::Tessellation;
@@ -64,6 +65,19 @@ impl GroupedFacets {
             faces.filter(|(placed, bare)| *bare && has_area(placed)).count() * count
         };
         models.iter().zip(self.counted()).map(bare).sum()
+    }
+
+    /// Returns how many facets of the scene turn farther from the surface normals at their corners than [`Settings::angle_deg`], each
+    /// counted at all places of its group, and the largest such angle, degrees; `None` where none does, and where no angle was asked for.
+    /// `model` is the one that was meshed.
+    pub fn facets_over_angle(&self, model: &Model, settings: &Settings) -> Option<(usize, f64)> {
+        let models = self.instancing.as_ref().map_or(std::slice::from_ref(model), |i| &i.groups);
+        let steep = |(model, (mesh, count)): (&Model, (&FacetMesh, usize))| {
+            let faces = steep_faces(mesh, model, settings).unwrap_or_default();
+            faces.into_iter().map(move |face| (face.facets * count, face.largest_deg))
+        };
+        let all = models.iter().zip(self.counted()).flat_map(steep);
+        all.reduce(|(facets, largest), (more, deg)| (facets + more, largest.max(deg)))
     }
 
     /// Returns how many bytes the meshes and the list of places hold.

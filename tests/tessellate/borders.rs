@@ -4,7 +4,8 @@ use crate::support::judge;
 use crate::support::trimmed::{chain, face};
 use lampyris::math::{Frame, Point, Uv};
 use lampyris::nurbs::{Surface, conic, sweep};
-use lampyris::tessellate::{Settings, Tessellation, tessellate};
+use lampyris::pipeline::angle_note;
+use lampyris::tessellate::{GroupedFacets, Settings, Tessellation, tessellate};
 use std::collections::HashSet;
 
 fn measured(tolerance: f64) -> Settings {
@@ -106,7 +107,8 @@ fn facets_beyond_the_angle_are_named() {
     let sides = (0..3).map(|k| chain(256, |f| c[k].lerp(c[(k + 1) % 3], f))).collect();
     let model = face(wall, &[sides]);
     for angle in [0.5, 1.0, 4.0] {
-        let made = tessellate(&model, &Settings { angle_deg: Some(angle), ..measured(2.0) });
+        let settings = Settings { angle_deg: Some(angle), ..measured(2.0) };
+        let made = tessellate(&model, &settings);
         let mut found = (0, 0f64);
         for (f, facet) in made.mesh.facets.iter().enumerate() {
             let p = made.mesh.corners(f);
@@ -122,9 +124,13 @@ fn facets_beyond_the_angle_are_named() {
                 found = (found.0 + 1, found.1.max(worst));
             }
         }
-        let said = made.report.over_angle.unwrap();
+        let said = made.report.over_angle.clone().unwrap();
         let sum = said.iter().fold((0, 0f64), |s, x| (s.0 + x.facets, s.1.max(x.largest_deg)));
         assert!(sum.0 == found.0 && (sum.1 - found.1).abs() < 1e-6, "{angle}: {sum:?} {found:?}");
+        // A run has the same in a note.
+        let facets = GroupedFacets::from(made);
+        assert_eq!(facets.facets_over_angle(&model, &settings), (sum.0 > 0).then_some(sum));
+        assert_eq!(angle_note(&facets, &model, &settings).is_some(), sum.0 > 0);
     }
 }
 

@@ -22,8 +22,8 @@ use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::{Aabb, Ray};
 use crate::model::Model;
 use crate::pipeline::{
-    AccurateSettings, IntersectorChoice, RayRecorder, TracingSettings, mesh_settings, settings_for_accuracy,
-    tessellate_by_part,
+    AccurateSettings, IntersectorChoice, RayRecorder, TracingSettings, angle_note, mesh_settings,
+    settings_for_accuracy, tessellate_by_part,
 };
 use crate::report::{CheckReport, unexplained, verdict};
 use crate::simulate::{RunSettings, Scene, simulate};
@@ -76,6 +76,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     let settings = mesh_settings(&meshing, scene, model)?;
     // Parts that are placed often are meshed, built and asked once, in their own coordinates.
     let facets = tessellate_by_part(model, &settings, &monitor);
+    angle_note(&facets, model, &settings).into_iter().for_each(|note| console.say(note));
     let normals = IntersectorChoice::new(&tracing, scene)?.normals;
     let count = given.as_ref().map_or(tracing.rays().unwrap_or(RAYS), |rays| rays.len() as u64);
     let structures = Structures::build(model, &facets, normals.on_facets(), count, console);
