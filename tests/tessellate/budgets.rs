@@ -128,6 +128,23 @@ fn a_twisted_face_keeps_its_angle_along_straight_edges_too() {
     }
 }
 
+/// A square cut out of it aslant, by 5° from its straight lines: its sides bend so little that for their sag alone a few chords would do,
+/// on which facets stood upright beside finer ones.
+#[test]
+fn no_facet_stands_upright_on_a_slightly_bent_edge_of_a_twisted_face() {
+    let whole = twisted_patch(0.0);
+    let surface = whole.parts[0].shells[0].faces[0].surface.clone();
+    let aslant = 5f64.to_radians();
+    let corner = |k: usize| Uv::splat(0.5) + 0.5 * Uv::from_angle(0.5 * PI * (k % 4) as f64 + 0.25 * PI + aslant);
+    let sides = (0..4).map(|k| chain(200, |t| corner(k).lerp(corner(k + 1), t))).collect();
+    let model = face(surface, &[sides]);
+    let angle = 2.0;
+    let report = tessellate(&model, &Settings { angle_deg: Some(angle), ..Settings::uniform(2.0) }).report;
+    assert!(report.certified == report.facets && report.repaired.is_empty());
+    let largest = report.over_angle.unwrap().iter().map(|s| s.largest_deg).fold(0.0, f64::max);
+    assert!(largest < 4.0 * angle && report.facets < 5000, "{largest} {}", report.facets);
+}
+
 /// A strip that bends along x and twists about y: cut along its straight lines alone, it would have no facet within the angle, however
 /// many.
 #[test]

@@ -37,8 +37,9 @@ impl DelaunayMesh<'_, '_> {
     }
 
     /// Returns the side, not on the outline and long enough to be divided for an angle, whose ends' normals differ most, if a normal breaks
-    /// the angle condition and that side turns by more than it; `None` otherwise, without a condition, and for a triangle without width in
-    /// parameters: it stands between a chord and its own arc, and so do all that it could be divided into.
+    /// the angle condition and that side turns by more than it; `None` otherwise, without a condition, for a triangle on a chord of the
+    /// outline that turns by more than twice the angle, and for one without width in parameters, which stands between a chord and its own
+    /// arc, as do all that it could be divided into.
     pub(super) fn steep_side(&self, t: [u32; 3]) -> Option<usize> {
         let most = self.surface.field.angle?;
         let n = t.map(|i| self.nodes[i]);
@@ -53,6 +54,10 @@ impl DelaunayMesh<'_, '_> {
             (Some(a), Some(b)) => a.angle_between(b),
             _ => 0.0,
         };
+        // No facet has both normals of such a chord within the angle, and one that reaches less far from it stands more upright.
+        if (0..3).any(|k| !self.is_inner(t[k], t[(k + 1) % 3]) && turn(k) > 2.0 * most) {
+            return None;
+        }
         let is_long = |k: usize| n[k].place.distance(n[(k + 1) % 3].place) > self.surface.field.least_of_angle();
         let free = (0..3).filter(|&k| self.is_inner(t[k], t[(k + 1) % 3]) && is_long(k));
         let side = free.max_by(|&a, &b| turn(a).total_cmp(&turn(b)))?;
