@@ -379,6 +379,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "query",
             "structure",
             "acceptance",
+            "gap_start",
             "settlement",
             "clip_hull",
             "clip_box",

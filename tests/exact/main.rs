@@ -8,6 +8,7 @@ mod drift;
 mod edges;
 #[path = "../support/files.rs"]
 mod files;
+mod gaps;
 mod grazing;
 mod hostile;
 mod models;

@@ -42,18 +42,19 @@ impl Exact {
         if query.departure.is_some_and(|own| own.is_same_point(leaf, local, t, &self.geometry)) {
             return;
         }
-        let mut near_trim = false;
+        let leaf_is_whole = self.linearizations[index as usize].whole;
         // A leaf that no trim passes has nothing to ask: there every root in range is on the face.
-        if !self.linearizations[index as usize].whole {
-            let (inside, near) = self.trim_side(query, leaf, local);
-            near_trim = near;
-            if !inside {
-                // Beside a trim and outside: another face should have taken it. Remembered, for where faces gape none does.
-                if near {
-                    query.reject_at_trim(t);
-                }
-                return;
+        let (inside, near_trim) = if leaf_is_whole { (true, false) } else { self.trim_side(query, leaf, local) };
+        let counts = match &query.gap_start {
+            Some(start) => self.counts_in_gap(query, start, &candidate, leaf, [inside, near_trim]),
+            None => inside,
+        };
+        if !counts {
+            // Beside a trim and outside: another face should have taken it. Remembered, because where faces gape none does.
+            if near_trim {
+                query.reject_at_trim(t);
             }
+            return;
         }
         query.accept(Root { t, leaf: index, local, certainty, near_trim, settled });
     }
@@ -72,22 +73,7 @@ impl Exact {
         }
         let jet = net::evaluate(leaf.net(&self.geometry.nets), leaf.degree, local[0], local[1]);
         let (_, du, dv) = project(&jet);
-        let widths =
-            [0, 1].map(|k| (leaf.rect[k][1] - leaf.rect[k][0]) * (patch.domain[k][1] - patch.domain[k][0]));
-        self.side_near_trim(query, face, uv, ([du, dv], widths))
-    }
-
-    /// [`Self::trim_side`] where no cell decides: at parameters of a face whose `tangents` are derivatives by parameters that are scaled by
-    /// `widths`.
-    pub(super) fn side_near_trim(
-        &self,
-        query: &Query,
-        face: &FaceRecord,
-        uv: Uv,
-        ([du, dv], widths): ([Vector; 2], [f64; 2]),
-    ) -> (bool, bool) {
-        let trim = &self.geometry.trims[face.trim as usize];
-        let place = trim.locate(uv, seen_metric(query.d, [du, dv], widths), face.flagging_distance);
+        let place = trim.locate(uv, seen_metric(query.d, leaf, patch, [du, dv]), face.flagging_distance);
         let flagging = self.flagging_uses(face, trim, place.near);
         if flagging.is_empty() {
             return (place.inside, false);

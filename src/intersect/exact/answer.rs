@@ -111,6 +111,8 @@ impl Exact {
         if !is_sound(ray) {
             query.slabs.misses = true;
             query.undecided_from = f64::NEG_INFINITY;
+        } else if let Some(start) = self.gap_start(query) {
+            query.look_back(start, &self.tree);
         }
     }
 
@@ -163,9 +165,9 @@ impl Exact {
                 last = size;
                 jet = net::evaluate(control, leaf.degree, local[0], local[1]);
             }
-            // Into the ray's own range; `t_max` has come down to the root by now.
-            t = t.clamp(query.t_min, query.limit);
         }
+        // Into the ray's own range, before which roots lie that gaps have moved; `t_max` has come down to the root by now.
+        t = t.min(query.limit).max(query.t_min);
         // A root may lie beyond its leaf by the margin of Newton's method, but the parameters of a hit are in the
         // domain.
         let inside = local.map(|x| x.clamp(0.0, 1.0));

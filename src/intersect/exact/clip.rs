@@ -180,7 +180,7 @@ impl Exact {
     fn clip_node(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node, stack: &mut Vec<Node>) -> Step {
         let (degree, seen) = (clipping.leaf.degree, clipping.seen);
         let Some(hull) = hull(&node.net, seen.homogeneous_margin) else { return Step::Done };
-        if hull.near > query.t_max || hull.far < query.t_min - TANGENT {
+        if hull.near > query.t_max || hull.far < query.from - TANGENT {
             return Step::Done;
         }
         // What the preconditioned hull leaves of the box, and its root where there is one at most.

@@ -4,7 +4,7 @@ use super::edge_use::edge_gaps;
 use super::net::{self, Jet, V4};
 use super::patch::{Patch, PatchGrid, is_ill_scaled, project};
 use super::reference::{self, ReferencePatch};
-use super::tolerances::FLAGGED_OF_GAP;
+use super::tolerances::{FLAGGED_OF_GAP, TANGENT};
 use super::trim::Trim;
 use crate::math::{FaceId, Frame, Point, Uv, Vector};
 use crate::model::{Edge, Face, Model, Part, PlacedFace};
@@ -14,7 +14,7 @@ use rustc_hash::FxHashMap;
 /// Gaps wider than this where the part stands are not bridged, but flagged, mm: solids with wider ones are not closed to any reader.
 pub(super) const WIDEST_GAP: f64 = 0.05;
 /// A file's edge may lie off its faces by their gap: each of the two faces must look that far, and as far again for the other's.
-const DECIDING_OF_GAP: f64 = 2.0;
+pub(super) const DECIDING_OF_GAP: f64 = 2.0;
 /// A vertex decides by its sectors as far off as this many times the distance by which an edge's end misses it.
 const RADIUS_OF_MISS: f64 = 4.0;
 
@@ -41,6 +41,8 @@ pub(super) struct FaceRecord {
     pub(super) flagging_distance: f64,
     /// Instance and shell, of faces of closed shells.
     pub(super) solid: Option<[u32; 2]>,
+    /// Whether a closed shell gapes at one of its edges by more than rounding.
+    pub(super) gapes: bool,
 }
 
 /// Everything but the search structure.
@@ -154,7 +156,8 @@ impl Geometry {
         let first_patch = self.patches.len() as u32;
         let placement = *placed.placement;
         let deciding_distance = self.world_band.max(DECIDING_OF_GAP * (face.gap * placement.scale).min(WIDEST_GAP));
-        let flagging_distance = self.flagging_distance(self.trims[trim as usize].widest_gap(), &placement);
+        let widest_gap = self.trims[trim as usize].widest_gap();
+        let flagging_distance = self.flagging_distance(widest_gap, &placement);
         let part = placed.part.0;
         self.faces.push(FaceRecord {
             id: placed.id,
@@ -167,6 +170,7 @@ impl Geometry {
             deciding_distance,
             flagging_distance,
             solid,
+            gapes: solid.is_some() && widest_gap * placement.scale > TANGENT,
         });
         for mut patch in face.surface.bezier_patches() {
             // Knot insertion in double precision would lose what such a patch's small side has of digits.

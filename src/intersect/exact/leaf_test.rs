@@ -208,7 +208,7 @@ pub(super) fn newton_step(query: &Query, oc: Vector, jet: &Jet) -> ([f64; 2], f6
 /// Whether a ray meets a leaf's oriented box, grown by `noise` mm, in what is left of its range.
 #[inline(always)]
 fn touches_oriented_box(query: &Query, leaf: &Leaf, oc: Vector, noise: f64) -> bool {
-    let (mut near, mut far) = (query.t_min, query.t_max);
+    let (mut near, mut far) = (query.from, query.t_max);
     for k in 0..3 {
         let (o, d) = (oc.dot(leaf.axes[k]), query.d.dot(leaf.axes[k]));
         let inv = 1.0 / if d.abs() < SMALLEST_COMPONENT { SMALLEST_COMPONENT.copysign(d) } else { d };

@@ -30,6 +30,7 @@ mod clip_box;
 mod clip_hull;
 mod double_double;
 mod edge_use;
+mod gap_start;
 mod geometry;
 mod leaf;
 mod leaf_test;

@@ -8,6 +8,8 @@ use super::tolerances::{SAME_PARAMETER, SAME_START, TANGENT, contact_distance};
 use super::tree::Tree;
 use crate::intersect::Certainty;
 use crate::math::{Point, Ray, Uv, Vector, orthonormal_pair};
+use crate::model::EdgeId;
+use smallvec::SmallVec;
 
 /// Ulps of its largest coordinate by which a ray's origin may miss the point it leaves: it is a rounded `origin + t·direction`
 /// of a ray that may have come sixty times as far as the origin lies from zero.
@@ -44,8 +46,8 @@ pub(super) struct Root {
 pub(super) struct DeparturePoint {
     /// Indices into [`Geometry::faces`] and [`Geometry::patches`], and parameters of the surface.
     pub(super) face: u32,
-    patch: u32,
-    uv: Uv,
+    pub(super) patch: u32,
+    pub(super) uv: Uv,
     /// Distance from the ray's origin to the stated surface point, mm.
     pub(super) off: f64,
     /// Below this, mm, the origin is taken to be that point.
@@ -54,6 +56,17 @@ pub(super) struct DeparturePoint {
     rounding: f64,
     /// [`contact_distance`] of the patch that it lies on.
     contact: f64,
+}
+
+/// The start of a ray that leaves a face of a closed shell in the gap of an edge: it may lie beyond the other face there.
+#[derive(Clone, Debug)]
+pub(super) struct GapStart {
+    /// How far from its start, mm, the other face may be met.
+    pub(super) reach: f64,
+    /// Whether it leaves its own face outward.
+    pub(super) outward: bool,
+    /// The edges nearby, and the ways from them into its own face.
+    pub(super) edges: SmallVec<[(EdgeId, Vector); 2]>,
 }
 
 /// A ray with everything that each leaf needs of it.
@@ -71,12 +84,16 @@ pub(super) struct Query {
     pub(super) slabs: RaySlabs,
     /// The ray's own least t.
     pub(super) t_min: f64,
+    /// Roots before are of no interest: `t_min`, and less for a ray with a `gap_start`.
+    pub(super) from: f64,
     /// Roots beyond are of no interest; shrinks with each root found in a search for the first.
     pub(super) t_max: f64,
     /// The ray's own largest t.
     pub(super) limit: f64,
     /// The point that the ray leaves.
     pub(super) departure: Option<DeparturePoint>,
+    /// Of a ray that leaves it in the gap of an edge.
+    pub(super) gap_start: Option<GapStart>,
     /// The nearest root so far, in a search for the first.
     pub(super) best: Option<Root>,
     /// Whether every root is looked for, not the first alone.
@@ -107,9 +124,11 @@ impl Query {
         n2: Vector::Z,
         slabs: RaySlabs::IDLE,
         t_min: 0.0,
+        from: 0.0,
         t_max: 0.0,
         limit: 0.0,
         departure: None,
+        gap_start: None,
         best: None,
         collects_all: false,
         all: Vec::new(),
@@ -136,9 +155,11 @@ impl Query {
         (self.n1, self.n2) = orthonormal_pair(ray.direction);
         self.slabs.restart(ray, tree);
         self.t_min = ray.t_min;
+        self.from = ray.t_min;
         self.t_max = ray.t_max;
         self.limit = ray.t_max;
         self.departure = None;
+        self.gap_start = None;
         if let Some(from) = ray.departure {
             self.departure = DeparturePoint::new(ray, from.face, from.uv, geometry);
         }
@@ -151,14 +172,25 @@ impl Query {
         self.clips = 0;
     }
 
-    /// Whether a root at `t` lies in the ray's range and before the nearest root so far.
+    /// Looks for roots from before the ray's range on, as its start needs.
+    pub(super) fn look_back(&mut self, start: GapStart, tree: &Tree) {
+        self.from = self.t_min.min(-start.reach);
+        self.gap_start = Some(start);
+        self.slabs.restart(&Ray::new(self.o, self.d).with_range(self.from, self.t_max), tree);
+    }
+
+    /// Whether a root at `t` lies where roots are looked for and before the nearest root so far.
     #[inline(always)]
     pub(super) fn is_in_range(&self, t: f64) -> bool {
-        t >= self.t_min && (t < self.t_max || (t == self.t_max && self.best.is_none()))
+        t >= self.from && (t < self.t_max || (t == self.t_max && self.best.is_none()))
     }
 
     /// Remembers the `t` of a root that a trim within its band has turned away.
     pub(super) fn reject_at_trim(&mut self, t: f64) {
+        // What lies before the range is looked at for its gap alone.
+        if t < self.t_min {
+            return;
+        }
         self.nearest_rejected = self.nearest_rejected.min(t);
         if self.collects_all {
             self.all_rejected.push(t);

@@ -142,6 +142,23 @@ impl Geometry {
         Some(if convex { by_nearest && by_other } else { by_nearest || by_other })
     }
 
+    /// Whether a ray passes an edge near a root, and what goes on straight beyond its ends, on the face's side; true where it runs along.
+    /// What comes in is as for [`Self::side_of_edges`].
+    pub(super) fn is_within_edge(
+        &self,
+        face: &FaceRecord,
+        trim: &Trim,
+        [origin, n1, n2]: [Vector; 3],
+        facing: f64,
+        near: &Near,
+    ) -> bool {
+        let (here, place) = (&trim.uses[near.owner as usize], &face.placement);
+        let curve = here.edge.and_then(|edge| self.edges.get(face.part as usize)?.get(edge.0 as usize));
+        let frame = [place.local_point(origin), place.local_direction(n1), place.local_direction(n2)];
+        let passed = curve.and_then(|curve| nearest_passage(curve, near.parameter, frame));
+        passed.is_none_or(|p| p.left ^ here.reversed ^ (facing < 0.0))
+    }
+
     /// Whether a ray, in the part's coordinates, through a vertex falls into one of the face's sectors there; `None` when it passes no
     /// vertex, or one with a corner that tells nothing: the ray runs along an edge of it, or nothing else bounds the face there. What
     /// other corners told is dropped then, and the nearest edge is left to decide.
