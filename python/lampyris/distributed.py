@@ -23,7 +23,7 @@ from .part import Interrupted, Part
 from .progress import ProgressCallback, callback
 from .results import Run
 from .scene import MOST_PARTS, Scene, named_files
-from .settings import Settings, whole_number
+from .settings import Settings, trace_settings, whole_number
 
 #: Parts for each thread of the cluster: enough that a slow one or a killed one costs little.
 PARTS_PER_THREAD = 4
@@ -78,7 +78,8 @@ class Bundle:
 def _prepared_scene(bundle: Bundle) -> Scene:
     with _preparing:
         scene = bundle.scene()
-        scene.prepare(progress=False, **bundle.settings)
+        # Whoever asked for the run was warned of its models: a worker would say it for every part.
+        scene._prepare(trace_settings(bundle.settings), False)
     return scene
 
 

@@ -118,11 +118,22 @@ pub(super) fn read_facets(path: &Path, rays: usize) -> Result<Vec<f64>, Error> {
     Ok(facets)
 }
 
-/// An NPY array of f64 or f32, read row by row.
+/// How the numbers of an NPY array are written: its name there, their bytes, and how they are read.
+type Numbers = (&'static str, u64, fn([u8; 8]) -> f64);
+/// Numbers that are read, little-endian; NumPy counts, as facets are counted, in whole ones.
+const NUMBERS: [Numbers; 6] = [
+    ("<f8", 8, f64::from_le_bytes),
+    ("<f4", 4, |raw| f64::from(f32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]]))),
+    ("<i8", 8, |raw| i64::from_le_bytes(raw) as f64),
+    ("<i4", 4, |raw| f64::from(i32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]]))),
+    ("<u8", 8, |raw| u64::from_le_bytes(raw) as f64),
+    ("<u4", 4, |raw| f64::from(u32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]]))),
+];
+
+/// An NPY array of numbers, read row by row.
 struct ArrayReader<'a> {
     entry: BufReader<ZipFile<'a, BufReader<File>>>,
-    /// Bytes of a number.
-    bytes: u64,
+    numbers: Numbers,
     rows: u64,
     /// Rows that were read.
     done: u64,
@@ -147,13 +158,11 @@ impl<'a> ArrayReader<'a> {
         entry.read_exact(&mut header).map_err(cut)?;
         // Python writes the dictionary with blanks and quotes of either kind.
         let header = String::from_utf8_lossy(&header).replace([' ', '"'], "");
-        let bytes = if header.contains("'descr':'<f8'") {
-            8
-        } else if header.contains("'descr':'<f4'") {
-            4
-        } else {
-            return Err("its numbers are not little-endian f64 or f32".into());
+        let is_written = |(name, ..): &Numbers| header.contains(&format!("'descr':'{name}'"));
+        let Some(numbers) = NUMBERS.into_iter().find(is_written) else {
+            return Err("its numbers are not little-endian f64, f32 or whole ones of 32 or 64 bits".into());
         };
+        let (_, bytes, _) = numbers;
         let Some((shape, _)) = header.split_once("'shape':(").and_then(|(_, s)| s.split_once(')')) else {
             return Err("its header tells no shape".into());
         };
@@ -172,25 +181,23 @@ impl<'a> ArrayReader<'a> {
             format!("shape ({shape}) takes {wanted} bytes, more than a file of this size can hold of rays; written without \
                  compression (numpy.savez) it is read")
         })?;
-        Ok(Self { entry, bytes, rows: dims[0], done: 0 })
+        Ok(Self { entry, numbers, rows: dims[0], done: 0 })
     }
 
     /// Fills `row`, as long as the array is wide, with the numbers of the next row. The error, for people, names the row but not the array.
     fn read_row(&mut self, row: &mut [f64]) -> Result<(), String> {
+        let (_, bytes, read) = self.numbers;
         for number in row {
             let mut raw = [0; 8];
             // What is read grows with what is there, whatever the head says.
-            self.entry.read_exact(&mut raw[..self.bytes as usize]).map_err(|e| {
+            self.entry.read_exact(&mut raw[..bytes as usize]).map_err(|e| {
                 format!(
                     "it ends or is damaged within row {} of the {} that its head tells: {e}",
                     self.done + 1,
                     self.rows
                 )
             })?;
-            *number = match self.bytes {
-                8 => f64::from_le_bytes(raw),
-                _ => f64::from(f32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]])),
-            };
+            *number = read(raw);
         }
         self.done += 1;
         Ok(())

@@ -64,8 +64,8 @@ impl FundamentalForms {
     }
 
     /// How far the normal turns about a direction of the parameter plane, of any length, on a saddle, 1/mm: the geodesic torsion,
-    /// `√((k₁ − k)(k − k₂))`, or that of an asymptotic direction, `√(−k₁k₂)`, where it is less. 0 for a zero direction and where the surface
-    /// bends one way: there a line that is oblique to the principal directions has torsion too, but facets along these have none.
+    /// `√((k₁ − k)(k − k₂))`, or that of an asymptotic direction, `√(−k₁k₂)`, where it is less. 0 for a zero direction and where the
+    /// surface bends one way: there a line that is oblique to the principal directions has torsion too, but facets along these have none.
     pub(crate) fn saddle_torsion(&self, d: Uv) -> f64 {
         if d == Uv::ZERO {
             return 0.0;

@@ -2,7 +2,7 @@
 
 use super::prepared_scene::PreparedScene;
 use super::settings::IntersectorKind;
-use crate::simulate::{PartialRun, ReceiverResult, Results, Verification};
+use crate::simulate::{ChannelResult, PartialRun, ReceiverResult, Results, Verification};
 use crate::study::cross_check::CrossCheck;
 use crate::study::figures::{self, ReceiverFigures, TracedGeometry};
 use crate::study::geometric_error::GeometricError;
@@ -66,12 +66,13 @@ impl SceneResults {
                 self.with_unseen_rays(receiver, errors, &self.results.receivers[receiver].cells)
             }
         };
-        of_facets.map(|errors| self.with_lost_light(receiver, errors))
+        of_facets.map(|errors| self.with_lost_light(receiver, errors, &self.results.receivers[receiver].cells, 1.0))
     }
 
-    /// Adds to errors of a receiver's cells what lost light might have brought them: a share of their own, and, as it need not have
-    /// come where other light did, as much as each cell has of all of it where it is spread over the whole receiver.
-    fn with_lost_light(&self, receiver: usize, errors: Vec<f64>) -> Vec<f64> {
+    /// Adds to errors of a receiver's cells, or of those of one of its channels, which counts `worth` of a watt, what lost light might have
+    /// brought them: a share of their own, and, as it need not have come where other light did, as much as each cell has of all of it
+    /// where it is spread over the whole receiver.
+    fn with_lost_light(&self, receiver: usize, errors: Vec<f64>, cells: &[f64], worth: f64) -> Vec<f64> {
         let (r, power) = (&self.results.receivers[receiver], &self.results.power);
         if power.lost <= 0.0 {
             return errors;
@@ -79,8 +80,8 @@ impl SceneResults {
         // Off a disc there are no cells, and a ray adds nothing.
         let is_on = |k: usize| r.ray_cells[k] > 0.0;
         let whole: f64 = (0..r.cells.len()).filter(|&k| is_on(k)).map(|k| r.lit_measure(k)).sum();
-        let (share, even) = (power.lost / power.emitted, power.lost / whole);
-        let lost = |k: usize| if is_on(k) { even.hypot(share * r.cells[k]) } else { 0.0 };
+        let (share, even) = (power.lost / power.emitted, worth * power.lost / whole);
+        let lost = |k: usize| if is_on(k) { even.hypot(share * cells[k]) } else { 0.0 };
         errors.into_iter().enumerate().map(|(k, error)| error.hypot(lost(k))).collect()
     }
 
@@ -91,8 +92,8 @@ impl SceneResults {
         Some(errors.iter().zip(cells).map(|(error, cell)| error.hypot(share * cell)).collect())
     }
 
-    /// Returns for each further channel of a receiver the errors of its cells from the facets, in its unit; zeros on the spline, `None`
-    /// where they are not known.
+    /// Returns for each further channel of a receiver the errors of its cells from the facets, in its unit, as
+    /// [`Self::geometric_cells`] does; `None` where they are not known.
     pub fn geometric_channel_cells(&self, prepared: &PreparedScene, receiver: usize) -> Vec<Option<Vec<f64>>> {
         let none = Some(vec![0.0; self.results.receivers[receiver].cells.len()]);
         let of_channel = |c: usize| match (prepared.choice.intersector, &self.geometric) {
@@ -103,7 +104,13 @@ impl SceneResults {
                 self.with_unseen_rays(receiver, errors, &self.results.receivers[receiver].channels[c].cells)
             }
         };
-        (0..self.results.receivers[receiver].channels.len()).map(of_channel).collect()
+        let r = &self.results.receivers[receiver];
+        let with_lost = |(c, channel): (usize, &ChannelResult)| {
+            of_channel(c).map(|errors| {
+                self.with_lost_light(receiver, errors, &channel.cells, figures::channel_worth(r, channel))
+            })
+        };
+        r.channels.iter().enumerate().map(with_lost).collect()
     }
 
     /// Returns for each face that the results list the errors from the facets of what it absorbed, let in and let out, in the unit of the

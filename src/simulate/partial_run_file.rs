@@ -17,7 +17,7 @@ use serde::de::DeserializeOwned;
 use std::io::{self, Write};
 
 /// Begins a file of this version.
-const MAGIC: &[u8] = b"lampyris tally 11\n";
+const MAGIC: &[u8] = b"lampyris tally 12\n";
 /// Bytes of the checksum that ends it.
 const CHECKSUM_BYTES: usize = 16;
 

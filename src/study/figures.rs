@@ -157,7 +157,7 @@ fn largest_of(cells: &[f64]) -> f64 {
 
 /// Returns what a channel counts of a watt on the receiver on average: lumens or CIE values, on a dark receiver the most that light of any
 /// wavelength has; 1 for a bin, which counts power.
-fn channel_worth(r: &ReceiverResult, c: &ChannelResult) -> f64 {
+pub(crate) fn channel_worth(r: &ReceiverResult, c: &ChannelResult) -> f64 {
     let [x, y, z] = observer_peaks().map(|peak| MAX_EFFICACY * peak);
     let most = match c.name.as_str() {
         "X" => x,
@@ -272,7 +272,10 @@ impl<'a> Errors<'a> {
         // The brightest place was measured over squares of cells: what facets change of it is taken as a share.
         let [cells, errors] = r.cells_with_even_poles();
         let brightest = (0..cells.len()).max_by(|&a, &b| cells[a].total_cmp(&cells[b]));
-        let max = self.geometric(self.lost_share * r.max, self.unmet_maximum(r), |m| {
+        // Of a dark receiver too: lost light spread over all of it.
+        let whole: f64 = (0..r.cells.len()).filter(|&k| r.ray_cells[k] > 0.0).map(|k| r.lit_measure(k)).sum();
+        let lost = (self.lost_share * r.max).hypot(if whole > 0.0 { self.lost_power / whole } else { 0.0 });
+        let max = self.geometric(lost, self.unmet_maximum(r), |m| {
             let square = if m.peak.facets > 0.0 { r.max / m.peak.facets } else { 1.0 } * m.peak.geometric();
             // The run may have its brightest cell elsewhere than the few rays that compared had theirs, where facets change nothing.
             let geometric = r.with_joined_cells(&m.cells);

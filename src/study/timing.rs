@@ -209,6 +209,17 @@ mod tests {
         assert_eq!(timings[1].1.runs, 2);
     }
 
+    /// Beside one of 5 ms another of nothing runs for as long in each round.
+    #[test]
+    fn what_is_short_is_repeated_for_as_long_as_the_slowest_takes() {
+        let runs = std::cell::Cell::new(0);
+        let mut rounds = Rounds::default();
+        rounds.add("slow", || std::thread::sleep(std::time::Duration::from_millis(5)));
+        rounds.add("short", || runs.set(runs.get() + 1));
+        let timings = rounds.run(2);
+        assert!(runs.get() > 10 && timings[1].1.min < 5e-4, "{} runs, {timings:?}", runs.get());
+    }
+
     #[test]
     fn short_runs_are_repeated_for_a_whole_turn() {
         let mut runs = 0;

@@ -6,7 +6,7 @@ use crate::turned::{arc, assembly, lines, turned};
 use lampyris::math::Point;
 use lampyris::model::Model;
 use lampyris::simulate::Results;
-use lampyris::study::figures::{Surface, figures};
+use lampyris::study::figures::{TracedGeometry, figures};
 use std::f64::consts::FRAC_PI_2;
 
 const N: f64 = 1.5;
@@ -138,13 +138,14 @@ fn lost_light_is_an_error_of_places_too() {
     let mut world = World::default();
     world.cuboid("cup", Point::ZERO, Point::splat(10.0));
     world.model.parts[0].shells[0].faces.retain(|f| f.name != "z1");
-    world.shapes.pop();
+    world.model.parts[0].shells[0].closed = false;
+    world.shapes.remove(5);
     let text = "[run]\nrays = 5000\n[[medium]]\nname = 'm'\nindex = 1.0\n[[material]]\npart = '*'\nmedium = 'm'
         [[source]]\nkind = 'collimated'\nat = [0, 5, -3]\nsize = [20, 2]\ninside = []
         [[receiver]]\nname = 'screen'\nat = [0, 5, 30]\nsize = [40, 20]\ncells = [4, 2]";
     let r = world.run(text, |_| ());
     assert!((r.power.lost - 0.5).abs() < 0.01, "{:?}", r.power);
-    let figures = &figures(&r, Surface::Spline, "W")[0];
+    let figures = &figures(&r, TracedGeometry::Spline, "W")[0];
     let [centroid, rms] = [&figures.centroid_1, &figures.rms_1].map(|figure| figure.as_ref().unwrap());
     assert!((centroid.value + 5.0).abs() < 0.1, "{centroid:?}");
     assert!(

@@ -101,7 +101,7 @@ fn parts_of_false_lengths_are_refused() {
     huge.write(&(), &mut bytes).unwrap();
     assert_eq!(PartialRun::read_alone::<()>(&bytes).unwrap().1, huge);
     // The number of receivers stands behind header, replicates, whether it grows, what is done, and seconds.
-    let receivers = b"lampyris tally 11\n".len() + 8 + "null".len() + 3 * 4 + 8;
+    let receivers = b"lampyris tally 12\n".len() + 8 + "null".len() + 3 * 4 + 8;
     bytes[receivers..receivers + 4].copy_from_slice(&u32::MAX.to_le_bytes());
     assert!(PartialRun::read_alone::<()>(&bytes).unwrap_err().contains("checksum"));
     let body = bytes.len() - 16;

@@ -328,7 +328,7 @@ fn representations_in_a_circle_are_told() {
     for (maps, item) in [(direct, 31), (indirect, 33)] {
         let import = read(&format!("{part}{maps}"));
         assert_eq!(import.model.instances.len(), 1, "{maps}");
-        let told = format!("#{item}: this MAPPED_ITEM shows #110 in itself; that is left out");
+        let told = format!("assemblies.stp: #{item}: this MAPPED_ITEM shows #110 in itself; that is left out");
         assert_eq!(import.report.problems, [told], "{maps}");
     }
 }

@@ -153,6 +153,17 @@ fn a_sheet_with_a_border_is_open_whatever_it_calls_itself() {
         assert_eq!((part.shells.len(), part.shells[0].closed), (1, closed));
         assert_eq!(repairs_with(&import, "taken as open"), usize::from(!closed));
     }
+    // A round one of 12 sides whose faces have edges of their own, without any one of them.
+    let at = |k: usize| [0, 1].map(|i| 100.0 * (std::f64::consts::PI / 6.0 * (k as f64 - 3.0 * i as f64)).cos());
+    let outline: Vec<[f64; 2]> = (0..12).map(at).collect();
+    for lacking in [None, Some(0), Some(2), Some(7), Some(13)] {
+        let mut body = Body::prism(&outline, 10.0);
+        if let Some(k) = lacking {
+            body.faces.remove(k);
+        }
+        let import = read(&sheet_text_of(&[body.loose()]));
+        assert_eq!(import.model.parts[0].shells[0].closed, lacking.is_none(), "{lacking:?}");
+    }
     // A solid without its last face has a gap, and an inside all the same.
     assert!(read(&text_of(&[first(5)])).model.parts[0].shells[0].closed);
 }

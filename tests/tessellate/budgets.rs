@@ -106,7 +106,7 @@ fn twisted_patch(curvature: f64) -> Model {
     let points = [row(0.0, 0.0), row(0.5 * side, 0.0), row(side, side * side)].as_flattened().to_vec();
     let knots = [[vec![0.0; 3], vec![1.0; 3]].concat(), vec![0.0, 0.0, 1.0, 1.0]];
     let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Uv::from_array);
-    let chords = |k: usize| if k % 2 == 0 && curvature > 0.0 { 200 } else { 1 };
+    let chords = |k: usize| if k.is_multiple_of(2) && curvature > 0.0 { 200 } else { 1 };
     let sides = (0..4).map(|k| chain(chords(k), |t| corners[k].lerp(corners[(k + 1) % 4], t))).collect();
     face(Surface { degree: [2, 1], knots, points }, &[sides])
 }

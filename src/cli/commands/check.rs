@@ -10,7 +10,7 @@ use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::sentences::plain_sentence_lines;
 use crate::cli::output::terminal_tables::blank_table;
 use crate::cli::work::contenders::{Contenders, Structures};
-use crate::cli::work::input_files::{self, Input};
+use crate::cli::work::input_files;
 use crate::cli::work::input_guard::InputGuard;
 use crate::cli::work::output_place::{OutputPlace, require_report_space, try_file, try_folder};
 use crate::cli::work::ray_input::read_rays;
@@ -57,10 +57,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     let threads = threads::set_threads(command.tracing.threads)?;
     let given = command.rays_in.as_deref().map(read_rays).transpose()?;
     let input = input_files::scene_or_model(&command.file, command.placed, console)?;
-    let (scene, loaded) = match &input {
-        Input::Step(loaded) => (None, loaded),
-        Input::Scene(scene, loaded) => (Some(&**scene), loaded),
-    };
+    let (scene, loaded) = (input.scene(), input.loaded());
     // Which files a scene names is known when it is read.
     let guard = scene.map(|scene| guard.with_scene(scene));
     outputs.iter().try_for_each(|(option, path)| guard.as_ref().map_or(Ok(()), |g| g.refuse(option, path)))?;
@@ -125,8 +122,8 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
         say_files(command, &found, console);
     }
     // Last, because the answer counts although faces are missing.
-    let refused = input_files::report_refusals(loaded, command.limits.max_refused, console);
-    Ok(refused.and(report_defects(&found, console)))
+    Ok(input_files::report_refusals(loaded, command.limits.max_refused, console)
+        .and(report_defects(&found, console)))
 }
 
 /// The files that were asked for, by their options.

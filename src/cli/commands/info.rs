@@ -6,6 +6,7 @@ use crate::cli::console::{Console, print};
 use crate::cli::output::json::json_text;
 use crate::cli::output::terminal_tables::blank_table;
 use crate::cli::work::input_files;
+use crate::cli::work::threads::set_threads;
 use crate::cli::{completion::Completion, failure::Failure};
 use crate::report::{bytes, seconds};
 use crate::step::ImportReport;
@@ -27,6 +28,7 @@ pub(crate) fn run(
     placed: PlacedLimit,
     console: &Console,
 ) -> Result<Completion, Failure> {
+    set_threads(None)?;
     let import = input_files::step_file(path, &placed.settings(), console)?;
     let report = import.report;
     // Zero of zero faces are no excess.

@@ -8,6 +8,7 @@ use crate::cli::failure::Failure;
 use crate::cli::output::json::json_text;
 use crate::cli::work::input_files;
 use crate::cli::work::output_place::{folder_of, make_folder};
+use crate::cli::work::threads::set_threads;
 use crate::formats::{file_name, lower_extension, printable_line, write_atomic};
 use crate::model::Model;
 use crate::pipeline::LoadedModel;
@@ -36,6 +37,7 @@ pub(crate) fn run(
     placed: PlacedLimit,
     console: &Console,
 ) -> Result<Completion, Failure> {
+    set_threads(None)?;
     let usual_name = PathBuf::from(last_component(file)).with_extension("toml");
     let scene_file = output.unwrap_or(&usual_name).to_path_buf();
     // Whoever reads the file goes by the end of its name.

@@ -23,6 +23,19 @@ pub(crate) enum Input {
     Scene(Box<Scene>, LoadedModel),
 }
 
+impl Input {
+    /// The scene, if it is one.
+    pub(crate) fn scene(&self) -> Option<&Scene> {
+        if let Self::Scene(scene, _) = self { Some(scene) } else { None }
+    }
+
+    /// The model, or those of the scene in one.
+    pub(crate) fn loaded(&self) -> &LoadedModel {
+        let (Self::Step(loaded) | Self::Scene(_, loaded)) = self;
+        loaded
+    }
+}
+
 /// Reads one STEP file, showing a spinner meanwhile.
 pub(crate) fn step_file(path: &Path, settings: &step::Settings, console: &Console) -> Result<Import, Failure> {
     let spinner = console.spinner(&format!("reading {}", path.display()));

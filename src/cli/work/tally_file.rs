@@ -154,19 +154,35 @@ impl TallyHeader {
         })
     }
 
-    /// Returns in words what a part of another run differs in from the `first` one, of seed, rays and scene; `None` where these are alike.
+    /// Returns in words what a part of another run differs in from the `first` one: the seed, the rays, options of the facets and of the
+    /// tracing; where these are alike, the place of the scene, of which there may be copies; `None` where that is the same, too.
     pub(crate) fn difference(&self, first: &Self) -> Option<String> {
         // The length of a run that grows tells it from no other.
         let grow = [self, first].iter().all(|h| h.run_rays.is_multiple_of(GROWING_REPLICATE));
         let words = |h: &Self| {
             let seed = h.seed.map_or_else(|| "the seed of its scene".to_owned(), |seed| format!("seed {seed}"));
             let rays = if grow { String::new() } else { format!("{} rays", grouped(h.run_rays)) };
-            [seed, rays, format!("the scene {}", h.scene().display())]
+            let named =
+                |key: &str, value: Option<&str>| format!("{key} {}", value.unwrap_or("of its scene or pilot"));
+            let tolerance =
+                h.tolerance.map(|t| t.map(f64::from_bits)).map(|[low, high]| format!("{low}..{high} mm"));
+            let [intersector, normals] = [&h.intersector, &h.normals].map(Option::as_deref);
+            vec![
+                seed,
+                rays,
+                named("the tolerance", tolerance.as_deref()),
+                named("the intersector", intersector),
+                named("the normals", normals),
+            ]
         };
-        let (own, of_first) = (words(self), words(first));
-        let (own, of_first): (Vec<String>, Vec<String>) =
-            own.into_iter().zip(of_first).filter(|(own, of_first)| own != of_first).unzip();
-        (!own.is_empty()).then(|| format!("with {}, the first part with {}", own.join(", "), of_first.join(", ")))
+        let place = |h: &Self| vec![format!("the scene {}", h.scene().display())];
+        let differing = |words: &dyn Fn(&Self) -> Vec<String>| {
+            let (own, of_first): (Vec<String>, Vec<String>) =
+                words(self).into_iter().zip(words(first)).filter(|(own, of_first)| own != of_first).unzip();
+            (!own.is_empty())
+                .then(|| format!("with {}, the first part with {}", own.join(", "), of_first.join(", ")))
+        };
+        differing(&words).or_else(|| differing(&place))
     }
 
     /// Returns where the scene was when the part was traced.

@@ -130,7 +130,7 @@ mod tests {
             .filter_map(|b| if let crate::report::Block::Table(t) = b { Some(t.to_csv()) } else { None })
             .collect();
         assert_eq!(csv[0], "intersector,rays,right,flagged,wrong\noctree,12,11,0,1\nexact,10,7,3,0\n");
-        assert_eq!(csv[1], "case,rays,octree,exact\npole,10,9/0/1,7/3/0\ncusp,2,2/0/0,0/0/0\n");
+        assert_eq!(csv[1], "case,rays a variant,octree,exact\npole,5,9/0/1,7/3/0\ncusp,2,2/0/0,0/0/0\n");
     }
 
     #[test]

@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// Cells across a face in each parameter, at least.
 const CELLS: usize = 32;
 /// Most of them: a face of more knots has several to a cell.
-const MOST_CELLS: usize = 1024;
+const MOST_CELLS: usize = 256;
 /// By how much a piece between knots may be wider than a cell, as a share of it, for its rounding.
 const ROUNDED_WIDTH: f64 = 1e-9;
 

@@ -134,11 +134,6 @@ pub(super) fn looks_inwards(faces: &[Face]) -> Option<bool> {
     if is_inside_out(faces, false) { Some(true) } else { is_inside_out(faces, true).then_some(false) }
 }
 
-/// Whether a void is none, as part of it certainly lies outside of the shell that is said to enclose it.
-pub(super) fn lies_outside(void: &[Face], outer: &[Face]) -> bool {
-    !FaceBoxes::new(outer).may_enclose(&FaceBoxes::new(void))
-}
-
 /// Boxes of a shell: around all that its faces may enclose, and around what they certainly reach.
 pub(super) struct FaceBoxes {
     enclosed: Aabb,

@@ -6,9 +6,10 @@
 //! the recess of another that looks the other way is taken as a void of it.
 
 use super::orientation::{FaceBoxes, looks_inwards};
-use crate::math::Aabb;
+use crate::math::{Aabb, BoxTree};
 use crate::model::{EdgeId, Face, Part};
 use crate::nurbs::project;
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// Pieces above this many stay one shell: each is compared with all larger ones, 34 million pairs of so many.
@@ -16,8 +17,6 @@ const MAX_PIECES: usize = 8192;
 /// Shares of the extent of an edge and of that of all such edges within which another one runs along it, of faces that have edges of their
 /// own: wide, for a closed shell must not be opened; a shell of 900 mm leaves gaps of 0.006.
 const BESIDE_SHARES: [f64; 2] = [0.01, 1e-4];
-/// Edges of one face alone that are compared with all others: an open shell shows on any of them.
-const MAX_COMPARED: usize = 64;
 
 /// A solid of a shell that is several.
 #[derive(Debug, Default)]
@@ -29,15 +28,15 @@ pub(super) struct SolidFaces {
 /// Which faces use an edge, and how.
 struct EdgeSides {
     first: usize,
-    is_shared: bool,
+    uses: usize,
     /// Whether it is used along and against its parameter, as seen from outside.
     ways: [bool; 2],
 }
 
 impl EdgeSides {
-    /// Whether faces lie on both sides: two, or one that meets itself.
+    /// Whether faces lie on both sides: two, or one that meets itself, though it may run along the edge twice in one direction.
     fn is_joined(&self) -> bool {
-        self.is_shared || self.ways == [true; 2]
+        self.uses > 1
     }
 }
 
@@ -58,8 +57,8 @@ fn edge_sides(faces: &[Face]) -> (FxHashMap<EdgeId, EdgeSides>, Vec<usize>) {
     for (k, face) in faces.iter().enumerate() {
         for edge_use in face.loops.iter().flat_map(|l| &l.uses) {
             let Some(edge) = edge_use.edge else { continue };
-            let side = sides.entry(edge).or_insert(EdgeSides { first: k, is_shared: false, ways: [false; 2] });
-            side.is_shared |= side.first != k;
+            let side = sides.entry(edge).or_insert(EdgeSides { first: k, uses: 0, ways: [false; 2] });
+            side.uses += 1;
             // A face that looks the other way runs its loops the other way.
             side.ways[usize::from(edge_use.reversed != face.reversed)] = true;
             let [a, b] = [side.first, k].map(|face| first_joined(&mut joined, face));
@@ -86,20 +85,20 @@ pub(super) fn has_border(faces: &[Face], part: &Part) -> bool {
     single.sort_unstable();
     let curve = |k: usize| &part.edges[single[k].0 as usize].curve;
     let boxes: Vec<Aabb> = (0..single.len()).map(|k| curve(k).bounds()).collect();
+    let tree = BoxTree::new(&boxes);
     let extent = boxes.iter().fold(Aabb::EMPTY, |all, of_edge| all.union(*of_edge)).diagonal();
     let is_border = |k: usize| {
         let [a, b] = curve(k).domain();
         let middle = curve(k).evaluate(0.5 * (a + b));
         let near = (BESIDE_SHARES[0] * boxes[k].diagonal()).max(BESIDE_SHARES[1] * extent);
-        let is_beside = |other: usize| {
-            other != k
-                && boxes[other].grown(near).contains(middle)
-                && project::nearest(curve(other), middle).1 <= near
+        let is_beside = |other: u32| {
+            let other = other as usize;
+            other != k && project::nearest(curve(other), middle).1 <= near
         };
-        !(0..single.len()).any(is_beside)
+        !tree.any_meeting(&Aabb::from_points([middle]).grown(near), is_beside)
     };
-    let step = single.len().div_ceil(MAX_COMPARED).max(1);
-    (0..single.len()).step_by(step).any(is_border)
+    // All of them: of a shell whose faces have edges of their own few may be at its border.
+    (0..single.len()).into_par_iter().any(is_border)
 }
 
 /// Returns the number of the piece of each face, in the order of their first faces, and how many there are; `None` where there is but one,
@@ -167,6 +166,9 @@ fn piece_roles(pieces: &[Vec<Face>]) -> Vec<PieceRole> {
     let mut by_size: Vec<usize> = (0..pieces.len()).collect();
     by_size.sort_by(|&a, &b| boxes[b].diagonal().total_cmp(&boxes[a].diagonal()));
     let mut roles = vec![PieceRole::Solid; pieces.len()];
+    // Asked once of each: a body may have thousands of pieces in its box, and to ask it takes hundreds of points on each face.
+    let mut known: Vec<Option<Option<bool>>> = vec![None; pieces.len()];
+    let mut looks = |piece: usize| *known[piece].get_or_insert_with(|| looks_inwards(&pieces[piece]));
     for (rank, &k) in by_size.iter().enumerate() {
         let around = by_size[..rank].iter().rev().find(|&&larger| boxes[larger].may_enclose(&boxes[k]));
         let Some(&around) = around else { continue };
@@ -175,7 +177,7 @@ fn piece_roles(pieces: &[Vec<Face>]) -> Vec<PieceRole> {
             PieceRole::Solid => around,
             PieceRole::VoidOf(outer) | PieceRole::PartOf(outer) => outer,
         };
-        roles[k] = match [outer, k].map(|piece| looks_inwards(&pieces[piece])) {
+        roles[k] = match [outer, k].map(&mut looks) {
             // A block in the hole of a frame looks as the frame does.
             [Some(solid), Some(piece)] if solid == piece => PieceRole::Solid,
             [Some(_), Some(_)] => PieceRole::VoidOf(outer),

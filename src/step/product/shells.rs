@@ -1,7 +1,7 @@
 //! Faces into shells, and shells into solids, as their plans say; what cannot be as a plan says is mended and told.
 
 use super::numbering::{ConvertedPart, repair_note};
-use super::orientation::{FaceBoxes, faces_against_neighbours, is_inside_out, lies_outside};
+use super::orientation::{FaceBoxes, faces_against_neighbours, is_inside_out};
 use super::repeated_faces::{RepeatedFace, remove_repeated_faces};
 use super::shell_pieces::{SolidFaces, has_border, separate_solids};
 use super::styles::Styles;
@@ -26,7 +26,14 @@ pub(super) fn add_shells(
     let mut left: FxHashMap<u64, usize> = FxHashMap::default();
     items.shells.iter().flat_map(|s| &s.faces).for_each(|f| *left.entry(f.0).or_default() += 1);
     let mut removed: FxHashSet<u64> = FxHashSet::default();
-    let mut solids = SolidShells { geometry, styles, solids: Vec::new(), beside: Vec::new(), is_whole: false };
+    let mut solids = SolidShells {
+        geometry,
+        styles,
+        solids: Vec::new(),
+        boxes: Vec::new(),
+        beside: Vec::new(),
+        is_whole: false,
+    };
     for plan in &items.shells {
         let layer = plan.owners.iter().find_map(|o| styles.layer(*o));
         let mut own: Vec<Face> = Vec::with_capacity(plan.faces.len());
@@ -64,6 +71,8 @@ struct SolidShells<'r, 'f, 'a> {
     styles: &'r Styles,
     /// Of each solid its outer shell, and those of its voids.
     solids: Vec<Vec<Shell>>,
+    /// Boxes of their outer shells, once a void asks for them.
+    boxes: Vec<FaceBoxes>,
     /// Shells that are voids by the file's word and lie beside these solids, or have none around them.
     beside: Vec<Shell>,
     /// Whether the file's outer shell has all its faces.
@@ -74,6 +83,7 @@ impl SolidShells<'_, '_, '_> {
     /// Moves all shells into the part, each void behind its solid.
     fn finish(&mut self, part: &mut Part) {
         part.shells.extend(self.solids.drain(..).flatten());
+        self.boxes.clear();
         part.shells.append(&mut self.beside);
     }
 
@@ -135,8 +145,12 @@ impl SolidShells<'_, '_, '_> {
             return;
         }
         // Below a dome that was refused a void is outside of what is left.
-        let may_hold = |k: &usize| !(self.is_whole && lies_outside(&faces, &self.solids[*k][0].faces));
-        let size = |k: &usize| FaceBoxes::new(&self.solids[*k][0].faces).diagonal();
+        if self.boxes.is_empty() {
+            self.boxes = self.solids.iter().map(|shells| FaceBoxes::new(&shells[0].faces)).collect();
+        }
+        let own = FaceBoxes::new(&faces);
+        let may_hold = |k: &usize| !self.is_whole || self.boxes[*k].may_enclose(&own);
+        let size = |k: &usize| self.boxes[*k].diagonal();
         let holder = (0..self.solids.len()).filter(may_hold).min_by(|a, b| size(a).total_cmp(&size(b)));
         if holder.is_none() {
             // Of four pipes in a row, three of them voids of the first, light lost a fifth.
