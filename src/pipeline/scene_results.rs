@@ -79,8 +79,7 @@ impl SceneResults {
         }
         // Off a disc there are no cells, and a ray adds nothing.
         let is_on = |k: usize| r.ray_cells[k] > 0.0;
-        let whole: f64 = (0..r.cells.len()).filter(|&k| is_on(k)).map(|k| r.lit_measure(k)).sum();
-        let (share, even) = (power.lost / power.emitted, worth * power.lost / whole);
+        let (share, even) = (power.lost / power.emitted, worth * power.lost / r.whole_lit_measure());
         let lost = |k: usize| if is_on(k) { even.hypot(share * cells[k]) } else { 0.0 };
         errors.into_iter().enumerate().map(|(k, error)| error.hypot(lost(k))).collect()
     }

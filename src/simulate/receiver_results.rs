@@ -245,6 +245,11 @@ impl ReceiverResult {
         self.ray_power / self.ray_cells[cell]
     }
 
+    /// [`Self::lit_measure`] of all cells together; off a disc there are none, and a ray adds nothing.
+    pub fn whole_lit_measure(&self) -> f64 {
+        (0..self.cells.len()).filter(|&k| self.ray_cells[k] > 0.0).map(|k| self.lit_measure(k)).sum()
+    }
+
     /// Returns the cells and their errors with each ring of cells at a pole at its mean: these are slivers of one direction. Poles are γ 0°
     /// and 180° of planes C all around, V ±90° of type A and of spheres and H ±90° of type B over half a turn or more. Beside a pole, and
     /// at one where cells are taller than 15°, neighbours of a ring whose standard errors are above 3 % of them are joined to their mean

@@ -273,7 +273,7 @@ impl<'a> Errors<'a> {
         let [cells, errors] = r.cells_with_even_poles();
         let brightest = (0..cells.len()).max_by(|&a, &b| cells[a].total_cmp(&cells[b]));
         // Of a dark receiver too: lost light spread over all of it.
-        let whole: f64 = (0..r.cells.len()).filter(|&k| r.ray_cells[k] > 0.0).map(|k| r.lit_measure(k)).sum();
+        let whole = if self.lost_power > 0.0 { r.whole_lit_measure() } else { 0.0 };
         let lost = (self.lost_share * r.max).hypot(if whole > 0.0 { self.lost_power / whole } else { 0.0 });
         let max = self.geometric(lost, self.unmet_maximum(r), |m| {
             let square = if m.peak.facets > 0.0 { r.max / m.peak.facets } else { 1.0 } * m.peak.geometric();

@@ -3,7 +3,7 @@
 use super::geometry::FaceRecord;
 use super::leaf::Leaf;
 use super::net;
-use super::patch::{Patch, project};
+use super::patch::{Patch, metric, project};
 use super::query::{Query, Root};
 use super::structure::Exact;
 use super::trim::{Near, Region, Trim};
@@ -140,6 +140,5 @@ impl Exact {
 fn seen_metric(d: Vector, leaf: &Leaf, patch: &Patch, tangents: [Vector; 2]) -> [f64; 3] {
     let scale = |k: usize| (leaf.rect[k][1] - leaf.rect[k][0]) * (patch.domain[k][1] - patch.domain[k][0]);
     let across = |a: Vector, k: usize| (a - d * a.dot(d)) / scale(k);
-    let (su, sv) = (across(tangents[0], 0), across(tangents[1], 1));
-    [su.length_squared(), su.dot(sv), sv.length_squared()]
+    metric([across(tangents[0], 0), across(tangents[1], 1)])
 }

@@ -5,9 +5,9 @@
 //! its start. So the other face is looked for there as well: what leaves inward goes out next, and what leaves outward comes in.
 
 use super::acceptance::Candidate;
-use super::geometry::{DECIDING_OF_GAP, FaceRecord, WIDEST_GAP};
+use super::geometry::{DECIDING_OF_GAP, FaceRecord, bridged_gap};
 use super::leaf::Leaf;
-use super::patch::project;
+use super::patch::{metric, project};
 use super::query::{GapStart, Query};
 use super::structure::Exact;
 use super::tolerances::FLAGGED_OF_GAP;
@@ -40,16 +40,15 @@ impl Exact {
         let trim = &self.geometry.trims[face.trim as usize];
         let patch = &self.geometry.patches[own.patch as usize];
         let (_, du, dv) = project(&self.geometry.jet(patch, patch.local(own.uv)));
-        let [su, sv] = [(du, 0), (dv, 1)].map(|(d, k)| d / (patch.domain[k][1] - patch.domain[k][0]));
-        let metric = [su.length_squared(), su.dot(sv), sv.length_squared()];
+        let [su, sv] = patch.surface_tangents([du, dv]);
         let normal = su.cross(sv);
         let curves = &self.geometry.edges[face.part as usize];
         let outward = face.sign * normal.dot(query.d) > 0.0;
         let mut start = GapStart { reach: 0.0, outward, edges: SmallVec::new() };
-        for near in trim.locate(own.uv, metric, face.flagging_distance + own.off).near {
+        for near in trim.locate(own.uv, metric([su, sv]), face.flagging_distance + own.off).near {
             let edge_use = &trim.uses[near.owner as usize];
             // As far as roots stray; a start beside its own point, as one that was met before its range, may lie farther.
-            let gap = (edge_use.gap * face.placement.scale).min(WIDEST_GAP);
+            let gap = bridged_gap(edge_use.gap, &face.placement);
             let Some(edge) = edge_use.edge.filter(|_| near.distance <= FLAGGED_OF_GAP * gap + own.off) else {
                 continue;
             };
@@ -100,13 +99,12 @@ impl Exact {
             return is_other_way;
         }
         // Beyond another of its edges, as in a notch or below a step, the face's surface goes on where nothing is.
-        let [su, sv] = [(du, 0), (dv, 1)].map(|(d, k)| d / (patch.domain[k][1] - patch.domain[k][0]));
-        let metric = [su.length_squared(), su.dot(sv), sv.length_squared()];
+        let metric = metric(patch.surface_tangents([du, dv]));
         let (ray, facing) = ([query.o, query.n1, query.n2], du.cross(dv).dot(query.d));
         // Within the gaps of those edges, as at a corner, nothing is told of sides.
         let is_open = |near: &Near| {
             let edge_use = &trim.uses[near.owner as usize];
-            let gap = (edge_use.gap * met.placement.scale).min(WIDEST_GAP);
+            let gap = bridged_gap(edge_use.gap, &met.placement);
             near.distance <= DECIDING_OF_GAP * gap
                 || start.edges.iter().any(|(edge, _)| edge_use.edge == Some(*edge))
         };

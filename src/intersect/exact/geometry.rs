@@ -155,7 +155,7 @@ impl Geometry {
         self.by_id.insert(placed.id, record);
         let first_patch = self.patches.len() as u32;
         let placement = *placed.placement;
-        let deciding_distance = self.world_band.max(DECIDING_OF_GAP * (face.gap * placement.scale).min(WIDEST_GAP));
+        let deciding_distance = self.world_band.max(DECIDING_OF_GAP * bridged_gap(face.gap, &placement));
         let widest_gap = self.trims[trim as usize].widest_gap();
         let flagging_distance = self.flagging_distance(widest_gap, &placement);
         let part = placed.part.0;
@@ -250,6 +250,11 @@ impl Geometry {
         let (_, du, dv) = project(&self.jet(patch, patch.local(uv)));
         du.cross(dv).dot(direction)
     }
+}
+
+/// How much of a gap, in the units of the part, is bridged where the part stands, mm.
+pub(super) fn bridged_gap(gap: f64, placement: &Frame) -> f64 {
+    (gap * placement.scale).min(WIDEST_GAP)
 }
 
 /// Makes room for `more` items in a list that grows by an eighth at a time: patches and leaves are half a kilobyte each, and of lists that

@@ -121,6 +121,12 @@ impl Patch {
         [(uv.x - u0) / (u1 - u0), (uv.y - v0) / (v1 - v0)]
     }
 
+    /// Turns derivatives by local parameters into those by the surface's.
+    pub(super) fn surface_tangents(&self, [du, dv]: [Vector; 2]) -> [Vector; 2] {
+        let [[u0, u1], [v0, v1]] = self.domain;
+        [du / (u1 - u0), dv / (v1 - v0)]
+    }
+
     /// Turns local parameters into surface parameters.
     pub(super) fn uv(&self, [u, v]: [f64; 2]) -> Uv {
         let [[u0, u1], [v0, v1]] = self.domain;
@@ -140,6 +146,12 @@ pub(super) fn is_ill_scaled(patch: &BezierPatch) -> bool {
     let short = patch.domain.iter().any(|[a, b]| f64::EPSILON * a.abs().max(b.abs()) > LARGEST_ULP * (b - a));
     let weights = patch.points.iter().fold([f64::INFINITY, 0.0f64], |[lo, hi], p| [lo.min(p.w), hi.max(p.w)]);
     short || weights[1] > LARGEST_WEIGHT_RATIO * weights[0]
+}
+
+/// The first fundamental form of these derivatives: E, F, G.
+#[inline(always)]
+pub(super) fn metric([su, sv]: [Vector; 2]) -> [f64; 3] {
+    [su.length_squared(), su.dot(sv), sv.length_squared()]
 }
 
 /// Divides a homogeneous jet: the position about the centre, mm, and the first derivatives by u and v.
