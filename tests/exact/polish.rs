@@ -183,6 +183,35 @@ fn short_flat_rays_meet_the_sphere() {
 }
 
 /// What `rays` meet, bit by bit.
+/// Where the ray meets a facet on one patch and the spline on the next, nothing is in doubt: a sphere of 2 × 4 patches, met beside each of
+/// the lines between them.
+#[test]
+fn a_root_on_the_next_patch_is_moved_to() {
+    let model = model([sphere(50.0)]);
+    let mesh = mesh(&model, 0.2);
+    let exact = Exact::build(&model, &Settings::default());
+    let facets = EveryFacet(&mesh);
+    let polished = Polished::new(&facets, &mesh, &exact);
+    let mut s = Random(12);
+    let mut cost = Cost::default();
+    for k in 0..400 {
+        // Just before a meridian or the equator, met at 60° from the side: the facet below lies behind it.
+        let along = 1.2 * s.unit() - 0.6;
+        let (normal, line) = match k % 3 {
+            0 => (Vector::new(along.cos(), 0.0, along.sin()), Vector::Y),
+            1 => (Vector::new(0.0, -along.cos(), along.sin()), Vector::X),
+            _ => (Vector::new((along + 0.8).cos(), (along + 0.8).sin(), 0.0), Vector::Z),
+        };
+        let side = if s.unit() < 0.5 { -1.0 } else { 1.0 };
+        let target = Point::ZERO + (normal - 1e-5 * side * s.unit() * line).normalize() * 50.0;
+        let direction = (-0.5 * normal + side * 0.75f64.sqrt() * line).normalize();
+        let ray = Ray::new(target - 100.0 * direction, direction);
+        let hit = polished.intersect(&ray, &mut cost).unwrap();
+        assert!(hit.certainty == Certainty::Polished && (hit.t - 100.0).abs() < 1e-9, "{ray:?} {hit:?}");
+    }
+    assert_eq!(cost.doubtful, 0);
+}
+
 fn bits(hits: &[Option<Hit>]) -> Vec<Option<(u32, [u64; 6])>> {
     let of = |h: &Hit| (h.face.0, [h.t, h.uv.x, h.uv.y, h.normal.x, h.normal.y, h.normal.z].map(f64::to_bits));
     hits.iter().map(|h| h.as_ref().map(of)).collect()

@@ -59,6 +59,11 @@ fn cross<V: F64x8>(a: &Vectors<V>, b: &Vectors<V>) -> Vectors<V> {
     ]
 }
 
+#[inline(always)]
+fn square<V: F64x8>(x: V) -> V {
+    x.mul(x)
+}
+
 /// The largest coordinate in size in every lane.
 #[inline(always)]
 fn largest<V: F64x8>(v: &Vectors<V>) -> V {
@@ -93,6 +98,7 @@ pub(super) fn iterate<V: F64x8, const N: usize, const M: usize>(
     let near = V::load(&starts.near);
     let zero = V::splat(0.0);
     let (mut u, mut v) = (V::load(&starts.local[0]), V::load(&starts.local[1]));
+    // Square of the distance from the ray before the last step, mm².
     let mut last = V::splat(f64::INFINITY);
     let (mut t, mut residual) = (zero, zero);
     let (mut end_u, mut end_v) = (zero, zero);
@@ -105,17 +111,18 @@ pub(super) fn iterate<V: F64x8, const N: usize, const M: usize>(
         let e = [origin[0].sub(p[0]), origin[1].sub(p[1]), origin[2].sub(p[2])];
         let g = cross(&e, &direction);
         let n = cross(&du, &dv);
-        let slope = dot(&n, &direction);
-        let step_u = zero.sub(dot(&g, &dv)).div(slope);
-        let step_v = dot(&g, &du).div(slope);
-        let across = dot(&g, &g).sqrt();
+        let inverse = V::splat(1.0).div(dot(&n, &direction));
+        let step_u = zero.sub(dot(&g, &dv)).mul(inverse);
+        let step_v = dot(&g, &du).mul(inverse);
+        // Squares are compared: a root at each step would take as long as a small net's evaluation.
+        let across = dot(&g, &g);
         let rounding = V::splat(ROUNDING * f64::EPSILON).mul(largest(&origin).add(largest(&p)));
         // A lane ends where its next step is too short to matter, where steps no longer help, or where the distance
         // is rounding; and only near the ray.
         let moves = step_u.abs().max(step_v.abs()).mask_less(V::splat(LAST_STEP));
-        let stalled = across.mask_less(near) & last.mul(V::splat(0.5)).mask_at_most(across);
-        let settled = across.mask_at_most(rounding.mul(V::splat(SETTLED))) | stalled;
-        let on_ray = across.mask_at_most(near.add(rounding));
+        let stalled = across.mask_less(near.mul(near)) & last.mul(V::splat(0.25)).mask_at_most(across);
+        let settled = across.mask_at_most(square(rounding.mul(V::splat(SETTLED)))) | stalled;
+        let on_ray = across.mask_at_most(square(near.add(rounding)));
         let ends = (moves | settled) & on_ray & !ended;
         if ends != 0 {
             // The point is moved along by a step that needs no further evaluation.
@@ -128,14 +135,14 @@ pub(super) fn iterate<V: F64x8, const N: usize, const M: usize>(
             t = along.select(ends, t);
             end_u = u.add(moved_u).select(ends, end_u);
             end_v = v.add(moved_v).select(ends, end_v);
-            residual = across.select(ends, residual);
+            residual = across.sqrt().select(ends, residual);
             // Where a derivative is next to nothing, or both are parallel, the limit of the normal takes more than
             // a register: such a lane has no answer.
-            let (square, square_u, square_v) = (dot(&n, &n), dot(&du, &du), dot(&dv, &dv));
+            let (area, length_u, length_v) = (dot(&n, &n), dot(&du, &du), dot(&dv, &dv));
             let trusted = V::load(&starts.trusted);
-            let clear = square_u.mul(square_v).mul(V::splat(LEAST_SINE_SQUARED)).mask_less(square);
-            regular |= ends & trusted.mask_less(square_u) & trusted.mask_less(square_v) & clear;
-            let length = square.sqrt();
+            let clear = length_u.mul(length_v).mul(V::splat(LEAST_SINE_SQUARED)).mask_less(area);
+            regular |= ends & trusted.mask_less(length_u) & trusted.mask_less(length_v) & clear;
+            let length = area.sqrt();
             let unit = [n[0].div(length), n[1].div(length), n[2].div(length)];
             normal = select(ends, &unit, &normal);
             ended |= ends;

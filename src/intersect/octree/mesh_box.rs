@@ -15,6 +15,8 @@ pub(super) struct MeshBox {
     pub(super) high: [f64; 4],
     /// Four times the size of the box, mm: what an f32 box test is wrong by, in roundings.
     pub(super) reach: [f32; 4],
+    /// How far before a place in the box a ray may start and still be near the mesh, mm, negative.
+    farthest_back: f64,
 }
 
 /// Where a ray enters and leaves the mesh, wide enough for the rounding; `near` beyond `far` where it passes the mesh by.
@@ -33,17 +35,25 @@ impl MeshBox {
             low: lanes(bounds.min, f64::NEG_INFINITY),
             high: lanes(bounds.max, f64::INFINITY),
             reach: lanes(bounds.size() * 4.0, 0.0).map(|x| x as f32),
+            farthest_back: -bounds.diagonal(),
         }
     }
 
-    /// Whether a ray with this origin, in the mesh's coordinates, starts inside the box around the mesh.
+    /// Whether a point is inside the box around the mesh.
     #[inline(always)]
-    pub(super) fn holds(&self, origin: [f64; 4]) -> bool {
+    pub(super) fn holds(&self, point: [f64; 4]) -> bool {
         let mut inside = true;
         for a in 0..4 {
-            inside &= (origin[a] >= self.low[a]) & (origin[a] <= self.high[a]);
+            inside &= (point[a] >= self.low[a]) & (point[a] <= self.high[a]);
         }
         inside
+    }
+
+    /// From where on a ray whose origin is inside the box needs no move to the mesh, mm along it; `None` where its range begins so far
+    /// before the origin that it does.
+    #[inline(always)]
+    pub(super) fn inner_start(&self, ray: &Ray) -> Option<f64> {
+        (ray.t_min >= self.farthest_back).then_some(ray.t_min.min(0.0))
     }
 
     /// Where a ray with this origin and inverse direction, in four lanes of which the last does not count, passes the mesh within the range

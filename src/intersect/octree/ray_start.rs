@@ -28,8 +28,10 @@ pub(super) fn start(
     let direction = [ray.direction.x, ray.direction.y, ray.direction.z, 1.0];
     let origin = [ray.origin.x, ray.origin.y, ray.origin.z, 0.0];
     let inverse = direction.map(|d| 1.0 / if d.abs() < LEAST_COMPONENT { LEAST_COMPONENT.copysign(d) } else { d });
-    let is_inside = mesh_box.holds(origin) & (ray.t_min >= 0.0);
-    let shift = if is_inside { 0.0 } else { enter_mesh(ray, mesh_box, origin, inverse)? };
+    let shift = match mesh_box.inner_start(ray) {
+        Some(start) if mesh_box.holds(origin) => start,
+        _ => enter_mesh(ray, mesh_box, origin, inverse)?,
+    };
     let moved = moved(slack, shift);
     let mut octant = 0;
     // Not the way to the mesh as a fourth: sieves ask for the largest.
@@ -71,6 +73,21 @@ mod tests {
     use super::*;
     use crate::math::simd::{Instructions, Kernel, Level};
     use crate::math::{Aabb, Point, Vector};
+
+    /// A range that begins a little before a start inside begins there, in the box or not; one from far before it where it enters the box.
+    #[test]
+    fn ranges_that_begin_before_their_start_begin_near_the_mesh() {
+        let bounds = Aabb { min: Point::new(-3.0, 0.0, 5.0), max: Point::new(7.0, 2.0, 11.0) };
+        let mesh_box = MeshBox::new(Point::new(2.0, 1.0, 8.0), &bounds);
+        for (t_min, begins) in [(0.2, 0.0), (0.0, 0.0), (-0.2, -0.2), (-3.0, -3.0), (-100.0, -1.0)] {
+            let ray = Ray::new(Point::new(1.0, 0.5, 6.0), Vector::Z).with_range(t_min, f64::INFINITY);
+            for level in [Level::PORTABLE, Level::avx2()] {
+                let (found, boxes, _) = level.run(Start { ray: &ray, mesh_box: &mesh_box });
+                assert!((found.unwrap() - begins).abs() < 1e-12, "{t_min}: {found:?}");
+                assert_eq!(boxes.origin[2], (6.0 - 8.0 + begins) as f32);
+            }
+        }
+    }
 
     /// What a ray is in boxes and sieves.
     struct Start<'a> {

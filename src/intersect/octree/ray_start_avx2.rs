@@ -31,8 +31,11 @@ pub(super) fn start(
         let inverse = _mm256_div_pd(one, _mm256_blendv_pd(direction, signed_least, is_small));
         let after = _mm256_cmp_pd::<_CMP_GE_OQ>(origin, _mm256_loadu_pd(mesh_box.low.as_ptr()));
         let before = _mm256_cmp_pd::<_CMP_LE_OQ>(origin, _mm256_loadu_pd(mesh_box.high.as_ptr()));
-        let is_inside = (_mm256_movemask_pd(_mm256_and_pd(after, before)) == 15) & (ray.t_min >= 0.0);
-        let shift = if is_inside { 0.0 } else { enter_mesh(ray, mesh_box, numbers(origin), numbers(inverse))? };
+        let is_inside = _mm256_movemask_pd(_mm256_and_pd(after, before)) == 15;
+        let shift = match mesh_box.inner_start(ray) {
+            Some(start) if is_inside => start,
+            _ => enter_mesh(ray, mesh_box, numbers(origin), numbers(inverse))?,
+        };
         let moved = moved(slack, shift);
         let from_center = _mm256_sub_pd(origin, _mm256_loadu_pd(mesh_box.center.as_ptr()));
         let exact = _mm256_add_pd(from_center, _mm256_mul_pd(direction, _mm256_set1_pd(shift)));

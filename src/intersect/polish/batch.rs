@@ -22,6 +22,8 @@ const BATCH: usize = 512;
 const AHEAD: usize = 8;
 /// Facets whose roots lie behind a ray that it passes in the batch: more than one is rare.
 const MOST_BEHIND: usize = 3;
+/// Steps of Newton's method after which a search that goes from patch to patch is given up.
+const MOST_STEPS: u32 = 8;
 
 /// A ray of the batch that the facets are asked about.
 #[derive(Clone, Copy)]
@@ -102,9 +104,10 @@ impl Polished<'_> {
         space.of.clear();
         space.doubtful.clear();
         for (i, ray) in rays.iter().enumerate() {
-            if let Some(ahead) = rays.get(i + AHEAD).and_then(|r| r.departure) {
-                prefetch(&self.records, ahead.primitive as usize);
-            }
+            // Of a ray that leaves no facet the first: a branch on whether it does would be guessed wrong.
+            let ahead = rays.get(i + AHEAD).map_or(0, |ray| ray.departure.map_or(0, |from| from.primitive));
+            prefetch(&self.records, ahead as usize);
+            self.slabs.fetch(ahead);
             if let Some(start) = self.start(ray, clear) {
                 // A facet may lie before the range and its root in it: they are up to a sag apart across the facet,
                 // and more along a flat ray.
@@ -128,9 +131,9 @@ impl Polished<'_> {
         *cost += Cost { rays: 0, ..own };
         seeds.clear();
         for (k, hit) in facet_hits.iter().enumerate() {
-            if let Some(Some(ahead)) = facet_hits.get(k + AHEAD) {
-                prefetch(&self.records, ahead.primitive as usize);
-            }
+            let ahead = facet_hits.get(k + AHEAD).map_or(0, |hit| hit.map_or(0, |hit| hit.primitive));
+            prefetch(&self.records, ahead as usize);
+            self.slabs.fetch(ahead);
             if let Some(hit) = hit
                 && let Some(patch) = self.records[hit.primitive as usize].patch(self.exact, hit.uv)
             {
@@ -140,6 +143,12 @@ impl Polished<'_> {
         points.clear();
         points.resize(seeds.len(), None);
         self.exact.converge_batch(asked, seeds, points);
+        // Most of the others have their root beside the patch, on the next one.
+        for (seed, point) in seeds.iter().zip(points.iter_mut()).filter(|(_, point)| point.is_none()) {
+            let facet = facet_hits[seed.ray as usize].map_or(0, |hit| hit.primitive);
+            let face = self.records[facet as usize].face;
+            *point = self.exact.converge(&asked[seed.ray as usize], face, seed.uv, MOST_STEPS);
+        }
     }
 
     /// Decides about all rays that were asked, and writes the `hits` of those that are plain. Those that ask again, from behind the facet

@@ -1,6 +1,6 @@
 //! Where slabs are near a facet that has many of them: a grid over its box, in which most places of a large facet are far from all.
 
-use crate::math::{Aabb, Point};
+use crate::math::{Aabb, Point, Vector};
 
 /// Cells a side, one bit each.
 const CELLS: usize = 32;
@@ -8,11 +8,10 @@ const CELLS: usize = 32;
 /// A grid over the two longer sides of a box, with the cells that slabs reach into.
 #[derive(Clone, Debug)]
 pub(super) struct SlabMap {
-    /// Corner of its box.
-    corner: Point,
-    axes: [usize; 2],
-    /// Cells per mm along both axes; none along a side without length.
-    per_mm: [f64; 2],
+    /// Corner of its box, in cells.
+    corner: [f64; 2],
+    /// Along the two axes, cells per mm; zero along a side without length.
+    axes: [Vector; 2],
     rows: [u32; CELLS],
 }
 
@@ -21,18 +20,20 @@ impl SlabMap {
     pub(super) fn new(bounds: Aabb) -> Self {
         let size = bounds.size();
         let shortest = (1..3).fold(0, |shortest, a| if size[a] < size[shortest] { a } else { shortest });
-        let axes = [(shortest + 1) % 3, (shortest + 2) % 3];
-        let per_mm = axes.map(|a| if size[a] > 0.0 { CELLS as f64 / size[a] } else { 0.0 });
-        Self { corner: bounds.min, axes, per_mm, rows: [0; CELLS] }
+        let axes = [(shortest + 1) % 3, (shortest + 2) % 3].map(|a| {
+            let per_mm = if size[a] > 0.0 { CELLS as f64 / size[a] } else { 0.0 };
+            Vector::AXES[a] * per_mm
+        });
+        Self { corner: axes.map(|axis| bounds.min.dot(axis)), axes, rows: [0; CELLS] }
     }
 
     /// The row and the column of a place. Neither falls where a coordinate rises, so that what lies in a box lies in its cells.
     #[inline(always)]
     fn cell(&self, p: Point) -> [usize; 2] {
-        let [a, b] = self.axes;
-        // Casts cut off and saturate.
-        let along = |axis: usize, per_mm: f64| (((p[axis] - self.corner[axis]) * per_mm) as usize).min(CELLS - 1);
-        [along(a, self.per_mm[0]), along(b, self.per_mm[1])]
+        // A product with zeros beside one number is that number's: an index into the point would be a branch. Casts to the
+        // processor's own integers cut off and saturate.
+        let along = |k: usize| ((p.dot(self.axes[k]) - self.corner[k]) as i32).clamp(0, CELLS as i32 - 1) as usize;
+        [along(0), along(1)]
     }
 
     /// Marks the cells that a box reaches into.
@@ -60,7 +61,6 @@ fn columns(first: usize, last: usize) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Vector;
 
     #[test]
     fn what_touches_a_marked_box_is_told() {

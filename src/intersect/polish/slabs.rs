@@ -10,6 +10,7 @@
 use super::curved_cells::FLAT_SAG;
 use super::facet_record::FacetRecord;
 use super::slab_map::SlabMap;
+use crate::intersect::prefetch;
 use crate::math::{Aabb, BoxTree, Point, Vector};
 use crate::mesh::FacetMesh;
 use rayon::prelude::*;
@@ -40,15 +41,28 @@ struct Slab {
     sag: f32,
 }
 
+/// What is near a facet.
+#[derive(Clone, Copy, Debug)]
+struct Nearby {
+    /// Its slabs, by their place in [`Slabs::listed`]; none where there is nothing, or too much to list.
+    first: u32,
+    count: u32,
+    /// Its map, in [`Slabs::maps`]; [`NO_MAP`] for a facet without.
+    map: u32,
+}
+
+/// In [`Nearby::map`].
+const NO_MAP: u32 = u32::MAX;
+
 /// For each facet the slabs of other faces' facets that its piece of the spline comes near to.
 pub(super) struct Slabs {
     /// Of all facets that are not flat, and a tree of their boxes.
     all: Vec<Slab>,
     tree: BoxTree,
-    /// Of each facet its first slab in `listed`, and one more for the end of the last.
-    starts: Vec<u32>,
+    /// Of each facet.
+    nearby: Vec<Nearby>,
     listed: Vec<Slab>,
-    /// Of facets with more than a few, where the first that is listed names the map.
+    /// Of facets with more than a few.
     maps: Vec<SlabMap>,
     /// How far from a facet, mm, a place that rays leave by it may lie.
     reach: f64,
@@ -98,33 +112,40 @@ impl Slabs {
             (if is_listed { near } else { Listed::new() }, Some(map))
         };
         let of_facets: Vec<_> = lists.into_par_iter().enumerate().map(list_and_map).collect();
-        let (mut starts, mut listed, mut maps) = (vec![0], Vec::new(), Vec::new());
+        let (mut nearby, mut listed, mut maps) = (Vec::with_capacity(of_facets.len()), Vec::new(), Vec::new());
         for (near, map) in of_facets {
-            listed.extend(map.is_some().then(|| Slab::mapped(maps.len())));
+            let index = map.as_ref().map_or(NO_MAP, |_| maps.len() as u32);
+            nearby.push(Nearby { first: listed.len() as u32, count: near.len() as u32, map: index });
             maps.extend(map);
             listed.extend(near.iter().map(|&k| all[k as usize]));
-            starts.push(listed.len() as u32);
         }
-        Self { all, tree, starts, listed, maps, reach }
+        Self { all, tree, nearby, listed, maps, reach }
+    }
+
+    /// Prefetches what [`Self::meet`] looks at first for a facet.
+    #[inline(always)]
+    pub(super) fn fetch(&self, facet: u32) {
+        // Without a map an address that is never read.
+        let map = self.nearby.get(facet as usize).map_or(NO_MAP, |near| near.map);
+        prefetch(&self.maps, map as usize);
     }
 
     /// Whether the way between two places within reach of this facet touches a slab; both may be the same.
     #[inline(always)]
     pub(super) fn meet(&self, mesh: &FacetMesh, facet: u32, way: [Point; 2]) -> bool {
-        let range = self.starts[facet as usize] as usize..self.starts[facet as usize + 1] as usize;
-        !range.is_empty() && self.any_listed_meets(mesh, facet, way, &self.listed[range])
+        let near = self.nearby[facet as usize];
+        let may_meet =
+            if near.map == NO_MAP { near.count > 0 } else { self.maps[near.map as usize].may_touch(way) };
+        may_meet && self.any_nearby_meets(mesh, facet, way)
     }
 
-    /// [`Self::meet`] of the facet whose slabs these are.
-    fn any_listed_meets(&self, mesh: &FacetMesh, facet: u32, way: [Point; 2], listed: &[Slab]) -> bool {
-        let [first, slabs @ ..] = listed else { return false };
-        let Some(map) = first.map() else { return listed.iter().any(|slab| slab.meets(mesh, way)) };
-        self.maps[map].may_touch(way)
-            && if slabs.is_empty() {
-                self.any_meets(mesh, facet, way)
-            } else {
-                slabs.iter().any(|slab| slab.meets(mesh, way))
-            }
+    /// [`Self::meet`] of a facet that has slabs near it.
+    fn any_nearby_meets(&self, mesh: &FacetMesh, facet: u32, way: [Point; 2]) -> bool {
+        let Nearby { first, count, .. } = self.nearby[facet as usize];
+        if count == 0 {
+            return self.any_meets(mesh, facet, way);
+        }
+        self.listed[first as usize..(first + count) as usize].iter().any(|slab| slab.meets(mesh, way))
     }
 
     /// Whether a way touches a slab of another face than this facet's.
@@ -145,27 +166,13 @@ impl Slabs {
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&*self.all)
             + self.tree.bytes()
-            + size_of_val(&*self.starts)
+            + size_of_val(&*self.nearby)
             + size_of_val(&*self.listed)
             + size_of_val(&*self.maps)
     }
 }
 
-/// In [`Slab::facet`]: the other bits name a map of all slabs near a facet. A mesh has fewer facets.
-const MAPPED: u32 = 1 << 31;
-
 impl Slab {
-    /// What is listed first for a facet with a map: which one it is.
-    fn mapped(index: usize) -> Self {
-        Self { low: [0.0; 3], high: [0.0; 3], facet: MAPPED | index as u32, sag: 0.0 }
-    }
-
-    /// The map that it stands for, if any.
-    #[inline(always)]
-    fn map(&self) -> Option<usize> {
-        (self.facet & MAPPED != 0).then_some((self.facet & !MAPPED) as usize)
-    }
-
     /// The slab of a facet of this sag, mm.
     fn of_facet(mesh: &FacetMesh, facet: u32, sag: f32) -> Self {
         let corners = mesh.corners(facet as usize);

@@ -6,7 +6,7 @@ use super::curved_cells::LOOK_BACK_OF_FLAT;
 use super::limits::{BEND_OF_SAGS, HIDDEN_BENDS, LEAST_SLACK_SINE, SHORT_OF_SAGS};
 #[cfg(doc)]
 use super::slabs::Slabs;
-use crate::math::{Departure, Point, Ray, Uv, distance_to_triangle};
+use crate::math::{Departure, Point, Ray, Uv, Vector, distance_to_triangle};
 
 /// To which side of its surface a ray leaves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,23 +69,30 @@ impl Polished<'_> {
         }
     }
 
-    /// The sine at which a ray leaves the spline, negative for rays that go in; `None` where its next root may hide between the spline and
-    /// the facet, or nothing is known of the spline.
+    /// The sine at which a ray leaves the spline, negative for rays that go in, or one of its sign that is no larger; `None` where its next
+    /// root may hide between the spline and the facet, or nothing is known of the spline.
     ///
     /// On the way to such a root the sine to the surface turns from the one at the start to its negative, and it does so within about a
     /// facet; as far as the normals at the corners tell, it must not.
     fn sine_of_spline(&self, ray: &Ray, from: &Departure) -> Option<f64> {
-        let normal = self.exact.normal_at(from.face, from.uv)?;
         let facet = from.primitive as usize;
-        let bend = self.mesh.facets[facet]
-            .vertices
-            .map(|v| (self.mesh.vertices[v as usize].normal - normal).dot(ray.direction).abs())
-            .into_iter()
-            .fold(0.0, f64::max);
+        let sines =
+            self.mesh.facets[facet].vertices.map(|v| self.mesh.vertices[v as usize].normal.dot(ray.direction));
+        let least = sines.into_iter().fold(f64::INFINITY, f64::min);
+        let most = sines.into_iter().fold(f64::NEG_INFINITY, f64::max);
         let [a, b, c, d] = self.mesh.corners(facet);
-        let length = a.distance(b).max(b.distance(c)).max(c.distance(d)).max(d.distance(a));
-        let sag = f64::from(self.records[facet].sag);
+        let sides = [b - a, c - b, d - c, a - d].map(Vector::length_squared);
+        let length = sides.into_iter().fold(0.0, f64::max).sqrt();
+        let least_bend = BEND_OF_SAGS * f64::from(self.records[facet].sag) / length;
+        // The sine at the start is between those at the corners: where these differ little beside it, it need not be known, and the
+        // spline need not be evaluated.
+        let bounded = if least > 0.0 { least } else { most };
+        if least * most > 0.0 && bounded.abs() > HIDDEN_BENDS * (most - least).max(least_bend) {
+            return Some(bounded);
+        }
+        let normal = self.exact.normal_at(from.face, from.uv)?;
         let sine = normal.dot(ray.direction);
-        (sine.abs() > HIDDEN_BENDS * bend.max(BEND_OF_SAGS * sag / length)).then_some(sine)
+        let bend = (sine - least).max(most - sine).max(least_bend);
+        (sine.abs() > HIDDEN_BENDS * bend).then_some(sine)
     }
 }
