@@ -43,7 +43,7 @@ impl AgfGlass {
 
     /// Absorption coefficients by wavelength, `[nm, 1/mm]`, wavelengths rising: Beer's law solved for them. Transmittances below
     /// [`LEAST_TRANSMITTANCE`](Self::LEAST_TRANSMITTANCE), 0 above all, count as that, those above 1 as 1. Of a wavelength that comes
-    /// twice the first counts; one without a thickness tells nothing.
+    /// twice the first counts; one without a thickness is skipped.
     pub fn absorption(&self) -> Vec<[f64; 2]> {
         let known = self.transmittance.iter().filter(|[um, _, mm]| *um > 0.0 && *mm > 0.0);
         let coefficient = |share: f64, mm: f64| (-share.clamp(Self::LEAST_TRANSMITTANCE, 1.0).ln() / mm).max(0.0);

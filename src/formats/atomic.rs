@@ -120,7 +120,7 @@ pub(super) fn unfinished(path: &Path) -> PathBuf {
     path.with_file_name(format!("{}{}-{serial}.part", unfinished_prefix(path), Writer::this()))
 }
 
-/// Removes the unfinished files of this path that dead processes have left, as [`write_atomic`] does. Where the system does not tell
+/// Removes the unfinished files of this path that dead processes have left, as [`write_atomic`] does. Where the system does not report
 /// whether a process lives, as of another machine, a file that was not written to for a day counts as left. Failures are ignored.
 pub fn remove_stale(path: &Path) {
     static LAST: Mutex<Option<PartListing>> = Mutex::new(None);

@@ -36,7 +36,8 @@ pub enum ErrorKind {
     Malformed(String),
 }
 
-/// Returns what to do about a file that could not be written, as the end of a sentence; nothing where the error tells all that is known.
+/// Returns what to do about a file that could not be written, as the end of a sentence; empty where the error already says all that is
+/// known.
 fn writing_advice(error: &io::Error) -> &'static str {
     match error.kind() {
         io::ErrorKind::NotFound => "; check that the folder exists",

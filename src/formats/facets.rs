@@ -19,7 +19,7 @@ pub struct Facets<'a> {
     pub curvature_per_mm: Vec<f64>,
     /// Ray paths to show with the facets (GLB alone).
     pub paths: Option<&'a Polylines>,
-    /// What tells each face apart, by [`FaceId`], for views that show it; empty when nobody asks.
+    /// What identifies each face, by [`FaceId`], for views that show it; empty when not requested.
     pub labels: Vec<String>,
 }
 

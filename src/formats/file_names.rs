@@ -7,7 +7,7 @@ pub fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
-/// The extension in lower case, as formats are told by it; empty where a name has none, which is the extension of no format.
+/// The extension in lower case, by which formats are recognised; empty where a name has none, which matches no format.
 pub fn lower_extension(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
 }

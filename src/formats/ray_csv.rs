@@ -48,7 +48,7 @@ pub(super) fn read_csv(path: &Path, mut add: impl FnMut(LightRay) -> Result<(), 
     Ok(())
 }
 
-/// Makes rays of lines of numbers, with a header that tells the order of columns or without one.
+/// Parses rays from lines of numbers, with or without a header that gives the order of columns.
 struct RowReader<'a> {
     path: &'a Path,
     /// Position of each of [`COLUMNS`] in a line; empty before the first.
@@ -88,7 +88,7 @@ impl RowReader<'_> {
                 return Ok(None);
             }
         }
-        // Cells beyond those that are asked for may be missing, but no line may have more than the first.
+        // Cells beyond the required ones may be missing, but no line may have more than the first.
         let last = self.order.iter().max().map_or(0, |k| k + 1);
         if cells.len() < last || cells.len() > self.wanted {
             let message = match cells.len() {

@@ -26,7 +26,7 @@ const POWER_ONE: [f64; 8] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
 /// Arrays of [`ARRAYS`] that a list of light may lack.
 pub(super) const OPTIONAL_OF_LIGHT: &[&str] = &["wavelength_nm"];
-/// Those that a list may lack of which nothing is asked but where it hits; each ray then has the power 1.
+/// Columns that a list may lack if only its hits are needed; each ray then has power 1.
 pub(super) const OPTIONAL_OF_PATHS: &[&str] = &["power", "wavelength_nm"];
 
 /// Reads the arrays `origin`, `direction`, `power` and `wavelength_nm`, of which those named in `optional` may be missing, and hands each
@@ -164,7 +164,7 @@ impl<'a> ArrayReader<'a> {
         };
         let (_, bytes, _) = numbers;
         let Some((shape, _)) = header.split_once("'shape':(").and_then(|(_, s)| s.split_once(')')) else {
-            return Err("its header tells no shape".into());
+            return Err("its header gives no shape".into());
         };
         let dims: Vec<u64> = shape.split(',').filter(|d| !d.is_empty()).map_while(|d| d.parse().ok()).collect();
         let fits = match width {
@@ -192,7 +192,7 @@ impl<'a> ArrayReader<'a> {
             // What is read grows with what is there, whatever the head says.
             self.entry.read_exact(&mut raw[..bytes as usize]).map_err(|e| {
                 format!(
-                    "it ends or is damaged within row {} of the {} that its head tells: {e}",
+                    "it ends or is damaged within row {} of the {} that its header states: {e}",
                     self.done + 1,
                     self.rows
                 )

@@ -111,7 +111,7 @@ fn listed_wavelengths(rays: &[LightRay]) -> Result<Vec<f64>, String> {
     let known: Vec<f64> = rays.iter().filter_map(|r| r.wavelength_nm).collect();
     match rays.iter().position(|r| r.wavelength_nm.is_none()) {
         Some(ray) if !known.is_empty() => Err(format!(
-            "ray {} has no wavelength, where others have one; a list tells it for all of its rays or for none",
+            "ray {} has no wavelength, where others have one; a list states it for all of its rays or for none",
             ray + 1
         )),
         _ => Ok(known),

@@ -92,7 +92,7 @@ impl NpzStream {
             for (column, beside, _) in &self.columns {
                 zip.start_file(format!("{}.npy", column.name), options).map_err(io::Error::other)?;
                 let shape = match column.width {
-                    // NumPy tells a row of one number from a number.
+                    // NumPy distinguishes a row of one number from a scalar.
                     1 => vec![self.rows as usize],
                     n => vec![self.rows as usize, n],
                 };

@@ -1,14 +1,13 @@
 //! Who writes a file: the number of a process says it on one machine alone, and folders are shared.
 //!
-//! Known weakness: where the system tells nothing of the machine, two machines of a share can only be told apart by their processes'
+//! Known weakness: where the system does not identify the machine, two machines that share a folder differ only by their processes'
 //! numbers.
 
 use std::fmt;
 use std::sync::OnceLock;
 use std::time::Duration;
 
-/// What tells this boot of this machine, and the numbers that processes have here, from others: containers of one machine number their
-/// processes each from 1.
+/// What identifies this boot of this machine, and its process numbering: each container of a machine numbers its processes from 1.
 const SOURCES: [&str; 2] = ["/proc/sys/kernel/random/boot_id", "/proc/sys/kernel/hostname"];
 /// See [`SOURCES`]: a link.
 const PROCESS_NUMBERS: &str = "/proc/self/ns/pid";
@@ -67,23 +66,24 @@ impl fmt::Display for Writer {
     }
 }
 
-/// Whether a process of this machine runs; `None` where the system does not tell: only Linux shows processes as folders.
+/// Whether a process of this machine runs; `None` where the system does not report it: only Linux shows processes as folders.
 fn runs_here(process: u32) -> Option<bool> {
     let shows = std::fs::exists("/proc/self").ok()?;
     if shows { std::fs::exists(format!("/proc/{process}")).ok() } else { None }
 }
 
-/// The mark of this machine: a hash of what tells it, its boot and its numbering of processes from others, made once.
+/// The mark of this machine: a hash of what identifies it, its boot and its process numbering, computed once.
 fn this_machine() -> u32 {
     static MARK: OnceLock<u32> = OnceLock::new();
     *MARK.get_or_init(|| {
-        let mut told: Vec<String> = SOURCES.iter().filter_map(|path| std::fs::read_to_string(path).ok()).collect();
-        told.extend(std::fs::read_link(PROCESS_NUMBERS).map(|link| link.to_string_lossy().into_owned()));
+        let mut identity: Vec<String> =
+            SOURCES.iter().filter_map(|path| std::fs::read_to_string(path).ok()).collect();
+        identity.extend(std::fs::read_link(PROCESS_NUMBERS).map(|link| link.to_string_lossy().into_owned()));
         // Shells of one machine need not agree on these.
-        if told.is_empty() {
-            told.extend(VARIABLES.iter().filter_map(|name| std::env::var(name).ok()));
+        if identity.is_empty() {
+            identity.extend(VARIABLES.iter().filter_map(|name| std::env::var(name).ok()));
         }
-        crc32fast::hash(told.join("\n").as_bytes())
+        crc32fast::hash(identity.join("\n").as_bytes())
     })
 }
 

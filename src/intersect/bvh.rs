@@ -214,7 +214,7 @@ impl<'m> Bvh<'m> {
 
     /// Finds the nearest hit with the tree of obvhs and the facet test of the octree; `None` for a miss, and where the ray is not finite.
     fn nearest_cured(&self, corners: &[[Point; 4]], ray: &Ray, cost: &mut Cost) -> Option<FacetHit> {
-        // Lifted as for the octree: grazing rays would else be told differently.
+        // Lifted as for the octree: grazing rays would otherwise be classified differently.
         let ray = &self.surroundings.lifted(ray);
         let facet_ray = FacetRay::new(ray);
         let mut best = Nearest::up_to(ray.t_max);

@@ -1,7 +1,7 @@
 //! The normal of a cubic patch through the corners and normals of a facet, where a ray meets it.
 //!
-//! The patch is that of Vlachos et al., *Curved PN Triangles*, I3D 2001, and for quads its bicubic relative with the twists that corners
-//! and normals tell of.
+//! The patch is that of Vlachos et al., *Curved PN Triangles*, I3D 2001, and for quads its bicubic relative with the twists that follow
+//! from corners and normals.
 
 use super::corner_normals::parameters;
 use super::facet::FacetHit;

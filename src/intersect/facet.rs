@@ -3,10 +3,10 @@
 //! Watertight after Woop, Benthin, Wald, *Watertight Ray/Triangle Intersection*, JCGT 2(1), 2013: the corners are
 //! sheared so that the ray runs along an axis, and the sign of three edge functions decides. They are computed
 //! without fused operations, so that both sides of a shared edge get exactly opposite values; where one is zero its
-//! sign is taken in exact arithmetic. The result depends on ray and facet alone, not on who asks in which order.
+//! sign is taken in exact arithmetic. The result depends on ray and facet alone, not on the order of queries.
 //!
 //! A ray that leaves a facet ([`Ray::departure`]) cannot meet the triangle it starts on. Facets that share a vertex with
-//! it and have the start on their border are asked from a point moved a millionth of a facet into the starting
+//! it and have the start on their border are tested from a point moved a millionth of a facet into the starting
 //! triangle: so a concave neighbour is met where it is, and a convex one is not, whatever the rounding of the start.
 //! A ray that grazes the facet that it leaves starts a little over it ([`Surroundings::lifted`]).
 //! A start on the diagonal of a folded quad lies on the triangle that the departure names; where it names none, which triangle that is
@@ -68,7 +68,7 @@ impl Kernel for UsableBounds<'_> {
                 usable[lane] &= x.abs() <= LARGEST;
             }
         }
-        // Nearly always all are; else each is asked.
+        // Nearly always all are; else each is tested.
         let chunked = if usable.contains(&false) { 0 } else { chunks.len() * LANES / 3 };
         let corners = [low, high].map(|lanes| (0..LANES / 3).map(move |k| Point::from_slice(&lanes[3 * k..])));
         let of_chunks = corners.into_iter().flatten().filter(|_| chunked > 0);
@@ -340,7 +340,7 @@ fn axes(main: u8) -> [usize; 3] {
     AXES[usize::from(main.min(2))]
 }
 
-/// How a triangle is asked: from the ray's start, from a moved one, or not at all.
+/// How a triangle is tested: from the ray's start, from a moved one, or not at all.
 #[derive(Clone, Copy, Debug)]
 enum TriangleTest {
     Plain,

@@ -5,7 +5,7 @@
 //! The cubic patch is met where the ray meets it, by two Newton steps from the facet hit. It is of order 2 as well, four times
 //! below the bilinear rule and more: its twists are wrong by O(h³) where the surface has third derivatives; without them the order is 3.
 //! Weakness: all but the flat normal are only as good as the vertex normals of the
-//! mesh; across a crease inside a facet, which no vertex tells of, the cubic patch is no better than the bilinear rule.
+//! mesh; across a crease inside a facet, which no vertex records, the cubic patch is no better than the bilinear rule.
 
 use super::corner_normals::{CornerNormals, corner_normals, triangle};
 use super::cubic_patch::cubic_normal;

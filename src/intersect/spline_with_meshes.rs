@@ -1,6 +1,6 @@
 //! The exact spline beside facets of the faces that have no spline, as ready meshes have none: one nearest hit over both.
 //!
-//! A ray is asked of the spline first, then of an octree over those facets up to the hit that the spline gave.
+//! A ray is traced against the spline first, then against an octree over those facets up to the hit on the spline.
 //!
 //! Guarantee: the nearest hit of both, of equal ones that on the spline; the same bits for a single ray and a batch.
 //! Known weakness: where a ready mesh and a spline meet in one border each ends where it says itself, so that rays may pass between them.
@@ -12,7 +12,7 @@ use crate::math::Ray;
 use crate::mesh::FacetMesh;
 use smallvec::SmallVec;
 
-/// Rays that are asked of one and then of the other: as many as fit into the first cache with their hits.
+/// Rays that are traced against one and then the other: as many as fit into the first-level cache with their hits.
 const BATCH: usize = 64;
 
 /// The spline of a model, and facets of the faces that it leaves out.
@@ -50,12 +50,12 @@ impl<'a> SplineWithMeshes<'a> {
         Self { exact, meshes: Octree::build(meshes, settings) }
     }
 
-    /// The ray as the spline is asked it: what leaves a mesh leaves nothing of the spline.
+    /// The ray for the spline: one that leaves a mesh leaves nothing of the spline.
     fn spline_ray(&self, ray: &Ray) -> Ray {
         Ray { departure: ray.departure.filter(|from| self.exact.traces(from.face)), ..*ray }
     }
 
-    /// The ray as the meshes are asked it, up to the spline's hit.
+    /// The ray for the meshes, up to the spline's hit.
     fn mesh_ray(&self, ray: &Ray, spline: Option<&Hit>) -> Ray {
         let departure = ray.departure.filter(|from| !self.exact.traces(from.face));
         Ray { departure, t_max: spline.map_or(ray.t_max, |hit| hit.t), ..*ray }
@@ -70,7 +70,7 @@ impl<'a> SplineWithMeshes<'a> {
         }
         let mut on_meshes = [None; BATCH];
         let on_meshes = &mut on_meshes[..rays.len()];
-        // However many structures were asked, it was one ray.
+        // However many structures were queried, it was one ray.
         let counted = cost.rays;
         self.meshes.intersect_batch(&asked, on_meshes, cost);
         cost.rays = counted;

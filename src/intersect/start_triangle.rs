@@ -35,7 +35,8 @@ impl StartTriangle {
         Self { second, normal: (q - p).cross(r - p), corner: p, middle: (p + q + r) / 3.0 }
     }
 
-    /// Whether the start lies within `reach` mm of the diagonal, or beyond it, so that its place does not tell which triangle is ahead.
+    /// Whether the start lies within `reach` mm of the diagonal, or beyond it, so that its position does not decide which triangle is
+    /// ahead.
     pub(super) fn is_at_diagonal(&self, corners: &[Point; 4], start: Point, reach: f64) -> bool {
         distance_to_segment(start, corners[0], corners[2]) <= reach || is_over_second(corners, start) != self.second
     }

@@ -94,7 +94,7 @@ impl BoxTree {
         size_of_val(&*self.nodes)
     }
 
-    /// Whether one of the boxes that meet `bounds`, or touch it, is wanted: `is_wanted` is asked by index, in no order, up to the first.
+    /// Whether one of the boxes that meet `bounds`, or touch it, is wanted: `is_wanted` is called by index, in no order, up to the first.
     #[inline]
     pub fn any_meeting(&self, bounds: &Aabb, mut is_wanted: impl FnMut(u32) -> bool) -> bool {
         if bounds.is_empty() {
@@ -135,8 +135,8 @@ impl BoxTree {
         })
     }
 
-    /// Starts a walk through the boxes that a ray crosses from its `t_min` on. Where it ends is told to [`BoxWalk::next`]; its `t_max` does
-    /// not count.
+    /// Starts a walk through the boxes that a ray crosses from its `t_min` on. Where it ends is passed to [`BoxWalk::next`]; its `t_max`
+    /// does not count.
     #[inline]
     pub fn walk(&self, ray: &Ray) -> BoxWalk<'_> {
         let mut walk = self.ended_walk();

@@ -28,7 +28,7 @@ pub(crate) fn with_capacity<T>(count: usize) -> Vec<T> {
 /// took a tenth of a run of 10⁴ rays.
 ///
 /// The C library takes blocks from its heap up to the size of the largest that was freed elsewhere, and keeps the end of the heap, up to
-/// twice that, for what comes; other libraries are asked for nothing but memory.
+/// twice that, for what comes; other libraries only allocate the memory.
 #[cfg(feature = "cli")]
 pub(crate) fn prepare_heap() {
     const LARGEST_OF_HEAP: usize = 12 << 20;

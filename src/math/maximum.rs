@@ -27,7 +27,7 @@ pub(crate) fn error_of_maximum(values: impl Iterator<Item = [f64; 2]> + Clone) -
     let Some((place, [largest, own])) = values.clone().enumerate().max_by(by_value) else { return 0.0 };
     let may_be_largest = |[v, e]: [f64; 2]| e > 0.0 && e.is_finite() && v + REACH * e > largest;
     let rivals: Vec<[f64; 2]> = values.clone().filter(|value| may_be_largest(*value)).collect();
-    // A rival that is known far worse than the largest value may be above it in truth, and the level tells nothing of that.
+    // A rival that is known far worse than the largest value may be above it in truth, and the level does not show that.
     let others = values.enumerate().filter(|(k, value)| *k != place && may_be_largest(*value));
     let missed = others.map(|(_, [v, e])| e * mean_beyond((largest - v) / e)).fold(0.0, f64::max);
     own.hypot(excess_of_maximum(largest, &rivals).max(missed))

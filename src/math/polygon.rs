@@ -47,7 +47,7 @@ pub(crate) fn is_inside_polygons(polygons: &[Vec<Uv>], p: Uv) -> bool {
 mod tests {
     use super::*;
 
-    /// A ring: a square of side 4 with a hole of side 2, both with corners on the rows that are asked.
+    /// A ring: a square of side 4 with a hole of side 2, both with corners on the rows that are queried.
     #[test]
     fn holes_are_outside_and_corners_count_once() {
         let square =

@@ -33,7 +33,7 @@ pub struct Departure {
     pub primitive: u32,
     /// Surface parameters of the point on its face.
     pub uv: Uv,
-    /// The triangle of its facet, where that is known: on the diagonal of a folded quad rounding does not tell.
+    /// The triangle of its facet, where that is known: on the diagonal of a folded quad rounding does not decide.
     pub triangle: Option<QuadHalf>,
 }
 

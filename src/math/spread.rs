@@ -11,7 +11,7 @@ pub(crate) fn variance_of_sum(squares: f64, sum: f64, parts: usize) -> f64 {
 }
 
 /// Returns the variance of a sum of so many independent parts, from the sum of the squares of their distances from the mean: n/(n − 1)
-/// times that, as the mean was taken from the same parts. Fewer than two count as two: of one part the residual is 0 and tells nothing,
+/// times that, as the mean was taken from the same parts. Fewer than two count as two: of one part the residual is 0 and says nothing,
 /// which callers answer first.
 pub(crate) fn variance_from_residuals(residuals: f64, parts: usize) -> f64 {
     let n = parts.max(2) as f64;
@@ -46,7 +46,7 @@ const FEW_RAYS: f64 = 7.0;
 const LIGHT_RAY: f64 = 0.2;
 
 /// Returns the standard error of a power, given with that of its spread, to which the heaviest ray adds `ray`: that itself where no ray
-/// came, and beside the spread of a few much lighter ones, which tells nothing of heavy rays that did not come.
+/// came, and beside the spread of a few much lighter ones, which says nothing about heavy rays that did not come.
 pub(crate) fn error_beside_unseen_ray(power: f64, spread: f64, ray: f64) -> f64 {
     if power <= 0.0 {
         return ray;

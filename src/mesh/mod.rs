@@ -64,7 +64,7 @@ pub struct Facet {
 }
 
 impl Facet {
-    /// Whether the last two corners are one vertex; two vertices at one position are told apart.
+    /// Whether the last two corners are one vertex; two vertices at one position are distinct.
     pub fn is_triangle(&self) -> bool {
         self.vertices[2] == self.vertices[3]
     }

@@ -53,7 +53,7 @@ impl FacetMesh {
                 _ => t.nonmanifold_edges += 1,
             }
         }
-        // Faces are asked only for these few: kept for all edges they would double the memory.
+        // Faces are looked up only for these few: kept for all edges they would double the memory.
         let asked = if paired.is_empty() { 0..0 } else { facets };
         for f in asked {
             for side in self.sides(f) {

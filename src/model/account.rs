@@ -1,4 +1,4 @@
-//! What a model holds, face by face: the figures by which a person or a selector tells faces apart.
+//! What a model holds, face by face: the figures by which a person or a selector distinguishes faces.
 
 use super::outline::Outline;
 use super::{Colour, Face, Instance, Model, Part, Shell, SurfaceKind, TessellatedFace};
@@ -189,7 +189,7 @@ impl Face {
         let sweep = Sweep { face: self, breaks, swept };
         if self.loops.is_empty() {
             let sides = (0..4).map(|k| UvCurve::line(corners[k], corners[(k + 1) % 4], [0.0, 1.0]));
-            // The sign tells which way the loops run; an area has none.
+            // The sign shows which way the loops run; an area has none.
             return sides.map(|side| sweep.area_beside(&side)).sum::<f64>().abs();
         }
         let loops = self.bounding_loops();

@@ -245,7 +245,7 @@ impl Face {
 
     /// Whether it has loops that only cut holes: all in all they run clockwise.
     pub(crate) fn has_holes_alone(&self) -> bool {
-        // Most faces are told at once: meshing asks each of them, and the integral took a twentieth of it.
+        // Most faces are decided at once: meshing calls this for each of them, and the integral took a twentieth of its time.
         let least = |l: &TrimLoop| least_area_within(l.uses.iter().map(|u| (&u.uv, u.reversed)));
         if self.loops.iter().map(least).sum::<f64>() >= 0.0 {
             return false;

@@ -194,7 +194,7 @@ impl Model {
         self.instances.iter().map(step).collect()
     }
 
-    /// The id of the first face of one instance; of all of them [`Model::first_faces`] tells at once.
+    /// The id of the first face of one instance; [`Model::first_faces`] returns those of all instances at once.
     pub fn first_face(&self, instance: usize) -> FaceId {
         FaceId(self.instances[..instance].iter().map(|i| self.part(i.part).face_count()).sum::<usize>() as u32)
     }

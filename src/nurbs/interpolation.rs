@@ -16,7 +16,7 @@ use std::ops::Range;
 const LEAST_DEGREE: usize = 5;
 /// Most pieces of a fit in one direction, or two between corners where there are more of them.
 const MOST_PIECES: usize = 256;
-/// How often the part between two corners is halved at one place: beside a corner that was not told halving helps no more.
+/// How often the part between two corners is halved at one place: beside a corner that was not declared, further halving does not help.
 const MOST_HALVINGS: i32 = 8;
 /// Most lines of a surface along which pieces of the other direction are chosen.
 const PROBED_LINES: usize = 33;

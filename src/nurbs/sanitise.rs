@@ -94,7 +94,7 @@ pub fn expand_knots(distinct: &[f64], multiplicities: &[usize]) -> Option<Vec<f6
     Some(distinct.iter().zip(multiplicities).flat_map(|(&k, &m)| std::iter::repeat_n(k, m)).collect())
 }
 
-/// Makes a clamped curve of a file's parts, mm, and tells what had to be repaired; without weights all are 1.
+/// Makes a clamped curve of a file's parts, mm, and reports what had to be repaired; without weights all are 1.
 ///
 /// # Errors
 /// What cannot be repaired: see [`Defect`].
@@ -111,7 +111,7 @@ pub fn curve(
     Ok((Curve { degree, knots, points }, repairs))
 }
 
-/// Makes a clamped surface of a file's parts, mm, and tells what had to be repaired; `points[i * count_v + j]`, as are weights, which are
+/// Makes a clamped surface of a file's parts, mm, and reports repairs; `points[i * count_v + j]`, as are weights, which are
 /// 1 where there are none.
 ///
 /// # Errors

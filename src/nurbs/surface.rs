@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 const NO_PLANE: f64 = 1e-10;
 /// A derivative below this share of the other vanishes: the limit along the mixed derivative is taken.
 const VANISHING: f64 = 1e-8;
-/// How far inside the domain the normal is taken where no limit tells, as a share of it.
+/// How far inside the domain the normal is taken where no limit exists, as a share of it.
 const INSIDE_SHARE: f64 = 1e-4;
 /// Derivatives inside the domain whose product is below this share have no normal.
 const NO_NORMAL: f64 = 1e-12;
@@ -265,7 +265,7 @@ impl Surface {
             .into_iter()
             .map(|points| change(Curve { degree, knots: knots.clone(), points }))
             .collect();
-        // A change of the knots is the same for every line: the first one tells degree and knots of all.
+        // A change of the knots is the same for every line: the first one gives degree and knots of all.
         let first = &lines[0];
         let mut s = self.clone();
         s.degree[direction] = first.degree;

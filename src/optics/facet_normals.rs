@@ -11,7 +11,7 @@ use crate::math::Vector;
 pub struct FacetNormals {
     /// The normal to shade with.
     pub interpolated: Vector,
-    /// The facet's own, which tells its sides apart.
+    /// The facet's own, which distinguishes its sides.
     pub geometric: Vector,
     /// Whether the light goes to and fro in the edge between two facets: interpolated normals, which are alike there, would keep it for
     /// ever.

@@ -1,4 +1,4 @@
-//! Which facets turn farther from the surface normals than was asked.
+//! Which facets turn farther from the surface normals than the requested angle.
 
 use super::settings::Settings;
 use crate::mesh::FacetMesh;
@@ -22,7 +22,7 @@ pub struct SteepFace {
 }
 
 /// Lists the placed faces with facets that turn farther from the surface normals at their corners than [`Settings::angle_deg`], in the
-/// mesh's order; `None` when no angle was asked for. Quads count by the steeper triangle; triangles without area and faces that are meshes
+/// mesh's order; `None` when no angle was requested. Quads count by the steeper triangle; triangles without area and faces that are meshes
 /// in the file are passed over.
 pub(super) fn steep_faces(mesh: &FacetMesh, model: &Model, settings: &Settings) -> Option<Vec<SteepFace>> {
     let most = settings.angle_deg?;

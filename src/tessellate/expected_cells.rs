@@ -8,7 +8,7 @@ use crate::model::Face;
 use crate::nurbs::FundamentalForms;
 use std::f64::consts::FRAC_PI_2;
 
-/// Places along each side of a face's parameter box at which its curvature is asked.
+/// Places along each side of a face's parameter box at which its curvature is evaluated.
 const PLACES: usize = 12;
 /// Share of the places, those of sharpest curvature, that are left out: near a pole or a kink one place says nothing of its surroundings.
 const SHARPEST_PLACES: f64 = 0.1;

@@ -42,13 +42,13 @@ const SCALE_PLACES: usize = 5;
 const FEW_CELLS: usize = 4;
 
 /// Scale of the parameters of planes, whose triangles may have any shape: corners around a round hole do not stand on one circle then, and
-/// exact arithmetic need not tell that they do.
+/// exact arithmetic need not find that they do.
 const PLANE_SCALE: Uv = Uv::new(1.0, 0.875);
 
 /// By how much what facets cover may differ from what the border bounds: share of it, and of the box around it. Corners of cells are
 /// put on corners of the border up to 1e-7 of the box away.
 const COVERED: [f64; 2] = [1e-4, 1e-6];
-/// Sides of a loop that are asked whether it is a hole: of loops with thousands of sides all would take too long.
+/// Sides of a loop that vote on whether it is a hole: testing all sides of a loop with thousands would take too long.
 const VOTES: usize = 8;
 
 /// Why a face has no facets.
@@ -125,7 +125,7 @@ pub(super) fn mesh_with_imprint(
     let vertex_nodes = border.add_imprint(surface, imprint);
     let lines: Vec<[Uv; 2]> = border.imprinted.iter().map(|s| s.map(|n| border.nodes[n].uv)).collect();
     let budget = face_budget(face, surface, settings);
-    // The tree is asked for imprinted lines too, which no cell may lie across.
+    // The tree gets imprinted lines too, which no cell may lie across.
     let cells = split_for_angle(input, &polygons, &lines, budget);
     let mut prover = Prover::new(surface, settings.acceptance);
     // Pairing must not join triangles across a side that neighbours have.
@@ -279,7 +279,7 @@ fn give_up_proofs(triangles: &mut [ProvedFacet<3>], quads: &mut [ProvedFacet<4>]
 }
 
 /// Whether facets cover as much of the parameter plane as the border bounds, within [`COVERED`]. More is covered where they overlap or the
-/// border crosses itself, less where something is left out; a gap and an overlap of one size are not told.
+/// border crosses itself, less where something is left out; a gap and an overlap of one size cancel unnoticed.
 fn covers_area_of_border(transition: &Transition, quads: &[ProvedFacet<4>], polygons: &BorderPolygons) -> bool {
     let uv = |n: u32| transition.nodes[n].uv;
     let triangles = transition.triangles.iter().map(|f| signed_area(&f.nodes.map(uv)).abs());
@@ -310,7 +310,7 @@ fn covers_area_of_border(transition: &Transition, quads: &[ProvedFacet<4>], poly
 }
 
 /// Returns the factors for u and v, the larger one 1, that turn parameter lengths into counts of chords, so that triangles of the
-/// transition lie along the direction that bends less. 1 and 1 where curvature tells nothing.
+/// transition lie along the direction that bends less. 1 and 1 where curvature decides nothing.
 fn parameter_scale(surface: &FaceSurface<'_>, polygons: &BorderPolygons, cells: &Subdivision) -> Uv {
     let (lo, hi) = polygons.bounds();
     let n = if surface.affine { 1 } else { SCALE_PLACES };

@@ -252,7 +252,7 @@ impl<'a> FaceSurface<'a> {
 
     /// As [`FaceSurface::tolerance`], of another field than the surface's own.
     pub(super) fn tolerance_in(&self, field: &ToleranceField, uv: Uv) -> f64 {
-        // With one tolerance everywhere no curvature is asked for, which would cost second derivatives.
+        // With one tolerance everywhere no curvature is computed, which would cost second derivatives.
         if self.affine || field.tightest() == field.loosest() {
             return field.loosest();
         }

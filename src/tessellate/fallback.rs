@@ -78,7 +78,7 @@ fn filled_border(
     let triangles = fill(&mut loops).filter(|triangles| !triangles.is_empty())?;
     let mut out = FaceMesh { own: border.own, coincident: border.coincident, ..FaceMesh::default() };
     for mut t in triangles {
-        // Outside is told by the loops, along which neighbours run the other way: a fold between chords that cross has other normals.
+        // Outside is decided by the loops, along which neighbours run the other way: a fold between chords that cross has other normals.
         if surface.is_flipped() {
             t.swap(1, 2);
         }
@@ -97,7 +97,7 @@ fn filled_border(
     Some(out)
 }
 
-/// As [`border_alone`], where the facets lie within the tolerance of the surface, as far as samples tell; `None` elsewhere, and where no
+/// As [`border_alone`], where the facets lie within the tolerance of the surface, judged by samples; `None` elsewhere, and where no
 /// plane shows the border without a crossing, unless it is that of a strip between two edges.
 pub(super) fn border_within_tolerance(input: &FaceInput<'_, '_>) -> Option<FaceMesh> {
     let FaceInput { part, face, surface, divisions, shared, .. } = *input;

@@ -1,4 +1,4 @@
-//! Which faces of a triangulation lie inside its border, told by steps from face to face: the middle of a sliver beside a straight side is
+//! Which faces of a triangulation lie inside its border, found by steps from face to face: the middle of a sliver beside a straight side is
 //! rounded to either side of it.
 
 use spade::handles::{DirectedEdgeHandle, FixedFaceHandle, PossiblyOuterTag};
@@ -10,9 +10,9 @@ pub(super) type Side<'c, V> = DirectedEdgeHandle<'c, V, (), CdtEdge<()>, ()>;
 
 /// What a walk took.
 pub(super) struct Steps {
-    /// Faces that were told.
+    /// Faces that were decided.
     pub(super) asked: usize,
-    /// Sides that were looked at.
+    /// Sides that were examined.
     pub(super) looked: usize,
 }
 
@@ -104,14 +104,14 @@ mod tests {
         let mut cdt = ConstrainedDelaunayTriangulation::new();
         add_square(&mut cdt, 5.0);
         add_square(&mut cdt, 3.0);
-        let (told, _) = faces_inside(&cdt, |side| side.is_constraint_edge());
+        let (known, _) = faces_inside(&cdt, |side| side.is_constraint_edge());
         let is_in_hole = |face: FixedFaceHandle<PossiblyOuterTag>| {
             cdt.face(face).as_inner().is_some_and(|f| f.center().x.abs().max(f.center().y.abs()) < 3.0)
         };
         let hole: Vec<_> = cdt.all_faces().map(|f| f.fix()).filter(|&f| is_in_hole(f)).collect();
-        let mut inside = told.clone();
+        let mut inside = known.clone();
         inside[hole[1].index()] = None;
         let steps = flood(&cdt, &mut inside, [hole[0]], |side| side.is_constraint_edge());
-        assert_eq!((inside, steps.asked), (told, 1));
+        assert_eq!((inside, steps.asked), (known, 1));
     }
 }

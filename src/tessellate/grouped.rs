@@ -68,7 +68,7 @@ impl GroupedFacets {
     }
 
     /// Returns how many facets of the scene turn farther from the surface normals at their corners than [`Settings::angle_deg`], each
-    /// counted at all places of its group, and the largest such angle, degrees; `None` where none does, and where no angle was asked for.
+    /// counted at all places of its group, and the largest such angle, degrees; `None` where none does, and where no angle was requested.
     /// `model` is the one that was meshed.
     pub fn facets_over_angle(&self, model: &Model, settings: &Settings) -> Option<(usize, f64)> {
         let models = self.instancing.as_ref().map_or(std::slice::from_ref(model), |i| &i.groups);

@@ -49,7 +49,7 @@ fn times_finer([tightest, loosest]: [f64; 2]) -> f64 {
 const CELLS_OF_LARGE_FACE: f64 = 50_000.0;
 
 /// Returns the cells that a face may have, at most those that the settings grant each: of a large one by its control points and its
-/// curvature. All of them where an angle is asked for, few where the tolerance is within the rounding of coordinates.
+/// curvature. All of them where an angle is requested, few where the tolerance is within the rounding of coordinates.
 ///
 /// Where no facet fits, as along a fold that a damaged coordinate makes, cells are halved until the budget ends, however few the curvature
 /// of the rest foretells. A small face with a fold may be a real one, and keeps its budget.
@@ -109,7 +109,7 @@ pub(super) fn faces_beyond(parts: &[PlacedPart<'_>], settings: &Settings) -> Too
     beyond
 }
 
-/// Sets the cause of the failed faces of a report. `cause` is asked with the part and the face's place in it; where it knows none, the
+/// Sets the cause of the failed faces of a report. `cause` is called with the part and the face's place in it; where it knows none, the
 /// default stays.
 pub(super) fn name_causes(
     report: &mut Report,
@@ -157,7 +157,7 @@ mod tests {
         };
         assert_eq!([of(0.05, 0.0), of(0.2, 0.0), of(0.005, 0.0)], [800_000, 200_000, 8_000_000]);
         assert_eq!(of(0.05, 1e4), 4 * (200_000 + 10_000 * points as u64));
-        // What is asked to be less stays so.
+        // A smaller requested value stays.
         let few = Settings { most_cells: 10, budget: 20, ..Settings::default() };
         assert_eq!(within_size(&ball, &few), few);
     }

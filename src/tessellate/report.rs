@@ -14,9 +14,9 @@ pub struct Report {
     pub triangles: usize,
     /// Distinct positions.
     pub vertices: usize,
-    /// What was asked.
+    /// The requested tolerance.
     pub tolerance_mm: ToleranceRange,
-    /// What was reached.
+    /// The sag that was reached.
     pub sag_mm: Sag,
     /// Facets whose sampled sag exceeds their local tolerance; `None` when not measured.
     pub over_tolerance: Option<usize>,
@@ -34,7 +34,7 @@ pub struct Report {
     pub not_certified: Vec<NotCertified>,
     /// Faces of which something was given up, and what was reached there.
     pub repaired: Vec<RepairedFace>,
-    /// Faces with facets that turn farther from the surface normals than was asked; `None` when no angle was.
+    /// Faces with facets that turn farther from the surface normals than requested; `None` when no angle was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub over_angle: Option<Vec<SteepFace>>,
     /// Share of the area that is in facets with four corners.

@@ -183,7 +183,7 @@ fn beside_knots(spline: &Surface, mut at: Uv, middle: Uv) -> Uv {
 fn farthest_foot(surface: &CountedSurface<'_>, feet: &mut [Foot], pieces: &[[Uv; 3]], least: f64) -> f64 {
     // Only the farthest can raise the largest distance: it alone is looked for again, as long as that brings it nearer.
     while let Some(foot) = feet.iter_mut().max_by(|a, b| a.away.total_cmp(&b.away)) {
-        // Two ends of one distance differ by rounding, and no search tells which is right.
+        // Two ends of one distance differ by rounding, and no search decides which is right.
         if foot.away <= least * (1.0 + STILL) {
             return least.max(foot.away);
         }

@@ -1,8 +1,8 @@
 //! Which facets are sampled, where all of a model would take too long.
 //!
 //! A facet takes some 150 evaluations of its spline, one of a wild surface ten times as many. A first look at some facets of each face
-//! tells what one of them takes. If all together take more than the model may, faces share it: none gets more than a common limit, and of
-//! the facets of a face that takes more, those without proof come first and the others are spread evenly. Work is counted, not timed, so
+//! measures what one of them takes. If all together take more than the model may, faces share it: none gets more than a common limit, and
+//! of the facets of a face that takes more, those without proof come first and the others are spread evenly. Work is counted, not timed, so
 //! that the outcome is the same on any machine.
 
 use super::sample::{Sampled, sample_facets};

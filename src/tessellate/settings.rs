@@ -152,7 +152,7 @@ impl ToleranceField {
     /// Cleans and orders tolerances and radii, mm of the scene, and divides them by `scale`, that of the placement. What is not finite and
     /// positive becomes [`LEAST_LENGTH`].
     pub(super) fn new(tolerance: [f64; 2], radii: [f64; 2], law: ToleranceLaw, scale: f64) -> Self {
-        // A length that is no number becomes the least there is, so that nothing is ever looser than was asked.
+        // A length that is no number becomes the least there is, so that nothing is ever looser than requested.
         let clean = |x: f64| if x.is_finite() && x > 0.0 { x / scale } else { LEAST_LENGTH };
         let [a, b] = tolerance.map(clean);
         let [r, s] = radii.map(clean);

@@ -43,7 +43,7 @@ impl TakenChords {
 
 /// Returns the faces with diagonals that must go because the chord is the side of more than two facets of the shell, with these diagonals;
 /// `shells` are the numbers of faces of each shell, in the order of `meshes`; the last of several diagonals stays where no other chord is.
-/// What each face was asked to give up before, `taken`, is not asked for again, and of a face that `is_settled` nothing is.
+/// Chords that a face had to give up before, `taken`, are not returned again, nor any of a face that `is_settled`.
 pub(super) fn doubled_chords(
     shells: impl Iterator<Item = usize>,
     meshes: &[Option<FaceMesh>],

@@ -9,7 +9,7 @@ use super::proof::border_chord::BorderChords;
 const THIN: f64 = 1e-3;
 
 /// Returns the chords of the border beside turned facets with a corner inside the face; `facets` are the nodes of those in `made`, in its
-/// order, and `is_flipped` tells that what runs counter-clockwise there is seen from inside. Some come twice; chords of edges that do not
+/// order, and `is_flipped` means that what runs counter-clockwise there is seen from inside. Some come twice; chords of edges that do not
 /// bend are left out, for shorter ones would not help.
 pub(super) fn turned_chords(
     made: &FaceMesh,

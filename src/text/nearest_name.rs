@@ -43,7 +43,7 @@ pub(crate) fn nearest_or_listed<'a>(word: &str, names: impl IntoIterator<Item = 
     }
 }
 
-/// Returns the edit distance (Levenshtein 1966), which tells letters by their case. Quadratic, so that words are cut at
+/// Returns the edit distance (Levenshtein 1966), which is case-sensitive. Quadratic, so that words are cut at
 /// [`COMPARED`] letters.
 fn edit_distance(a: &str, b: &str) -> usize {
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(COMPARED).collect(), b.chars().take(COMPARED).collect());

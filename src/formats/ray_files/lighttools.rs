@@ -6,7 +6,7 @@ use super::ray_file::{Flux, RayFile, RowLayout, RowWavelength};
 use crate::formats::Error;
 use std::path::Path;
 
-/// Length of a unit in mm, by its number; 0 is the unit of the system that wrote the file, which the file does not tell.
+/// Length of a unit in mm, by its number; 0 is the unit of the system that wrote the file, which the file does not record.
 const UNITS_MM: [Option<f64>; 8] =
     [None, Some(1.0), Some(10.0), Some(1000.0), Some(25.4), Some(304.8), Some(1e-3), Some(1e-6)];
 

@@ -1,7 +1,7 @@
 //! Ray sets of measured light sources, as vendors publish them: IES TM-25 (read and written), Zemax binary and LightTools binary (read);
 //! and lists of rays in NPZ and CSV.
 //!
-//! A measured set is recognised by its first bytes, never by its name, for `.ray` and `.dat` mean a dozen things; lists are told apart by
+//! A measured set is recognised by its first bytes, never by its name, for `.ray` and `.dat` mean a dozen things; lists are recognised by
 //! their extension. Rays come in the unit of flux that the caller counts in where the file holds both. Where the header's total disagrees
 //! with the sum of the rays, as it does in files whose rays carry relative weights, the rays are scaled to the header's total and a note
 //! says so.
@@ -66,7 +66,7 @@ impl RayFile {
             start => {
                 let mut head = start.to_vec();
                 file.take(TEXT_HEAD).read_to_end(&mut head).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
-                // Of fewer bytes than are asked for, those that are missing are no bytes of the file.
+                // Of a file shorter than the buffer, the missing bytes are not part of the file.
                 if binary && !is_npz(path) {
                     refuse_bytes(path, &head)?;
                 }
@@ -130,7 +130,7 @@ pub fn read_rays(path: &Path) -> Result<Vec<LightRay>, Error> {
     Ok(rays)
 }
 
-/// Reads rays of which nothing is asked but where they hit, in any format that [`RayFile::open`] knows: an NPZ list may lack `power`, and
+/// Reads rays of which only the hits are needed, in any format that [`RayFile::open`] knows: an NPZ list may lack `power`, and
 /// its rays have 1 each.
 ///
 /// # Errors

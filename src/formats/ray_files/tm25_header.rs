@@ -150,7 +150,7 @@ impl Tm25Header {
     /// kept goes to `notes`; an error for other versions, values that the standard does not know, and where the rays would not end with the
     /// file.
     pub(super) fn read(file: &mut ByteReader, notes: &mut Vec<String>) -> Result<Self, Error> {
-        // The mark was read by whoever chose this reader; a caller who did not ask is told here.
+        // The mark was read by whoever chose this reader; a caller that did not check gets the error here.
         if &file.read_array::<4>("the mark TM25")? != b"TM25" {
             return Err(file.malformed("not a TM-25 file"));
         }
@@ -233,7 +233,7 @@ impl Tm25Header {
                 file.length()
             ))
         })?;
-        // The rays end with the file: where they start tells whether the names are there.
+        // The rays end with the file: where they start shows whether the names are present.
         let before_rays = file.length() - rays;
         let named = file.position() + COLUMN_NAME_BYTES * additional as u64 + self.text_bytes;
         let unnamed = file.position() + self.text_bytes;

@@ -89,7 +89,7 @@ impl Intersector for BinaryBvh<'_> {
                 let back = asked.intersects_triangle(a, c, b);
                 (back.distance, [back.v, back.u])
             };
-            // A miss is told by an endless distance.
+            // A miss is reported as an infinite distance.
             if found.is_finite() && (ray.t_min..=t_max).contains(&found) {
                 t_max = found;
                 nearest = Some(triangle.code.hit(found, weights));

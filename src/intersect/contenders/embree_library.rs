@@ -1,4 +1,4 @@
-//! Embree 4 as a library that the user names, opened when it is asked for and never linked.
+//! Embree 4 as a library that the user names, opened on request and never linked.
 
 use libloading::{Library, Symbol};
 use std::ffi::{c_char, c_int, c_uint, c_void};
@@ -120,7 +120,7 @@ impl EmbreeLibrary {
     pub fn open(path: &Path) -> Result<Arc<Self>, EmbreeError> {
         let unusable = |source| EmbreeError::Library { path: path.into(), source };
         // SAFETY: the names and arguments are those of Embree's C interface, `rtcore_device.h` of version 4; whether a file that bears
-        // them is Embree is for the user to know. The version is asked before anything whose arguments changed with it.
+        // them is Embree is for the user to know. The version is queried before any function whose arguments depend on it.
         #[allow(unsafe_code)]
         unsafe {
             let library = Library::new(path).map_err(unusable)?;

@@ -63,7 +63,7 @@ impl Exact {
     }
 
     /// Finds every crossing in the range of the ray, in order of t; one found from both sides of a patch border counts once. Whether any
-    /// may be missing is told by [`Self::passage`] alone.
+    /// may be missing is reported by [`Self::passage`] alone.
     pub fn crossings(&self, ray: &Ray, cost: &mut Cost) -> Vec<Hit> {
         self.passage(ray, cost).crossings
     }

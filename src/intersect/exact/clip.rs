@@ -34,7 +34,7 @@ const POINT_BOX: f64 = 1e-7;
 /// A box of which the hull leaves less than this share is cut down, others are halved: Nishita, Sederberg and Kakimoto halve above
 /// 0.8, but a halving costs half of a cut.
 const WORTH_CUTTING: f64 = 0.6;
-/// A box of this size that still holds more than one root is asked for a tangency: most rays that graze a surface have found theirs.
+/// A box of this size that still holds more than one root is tested for tangency: most rays that graze a surface have found theirs.
 const TANGENCY_BOX: f64 = 1.0 / 64.0;
 /// How far beyond its leaf a net from 32 digits is looked at, as a share of the leaf.
 const CRACK: f64 = 1e-8;
@@ -52,7 +52,7 @@ enum Step {
     Done,
     /// This way does not decide it: the next one is tried.
     Open,
-    /// `f64` cannot tell: the leaf is to be looked at in 32 digits, and what it has offered must be found again.
+    /// `f64` cannot decide: the leaf must be examined in 32 digits, and the roots it has offered be found again.
     AskPrecise,
 }
 
@@ -93,7 +93,7 @@ pub(super) fn clip(exact: &Exact, query: &mut Query, leaf: u32) {
 }
 
 impl Exact {
-    /// Looks for every root of the query on a leaf: in `f64`, and where that cannot tell once more in 32 digits.
+    /// Looks for every root of the query on a leaf: in `f64`, and where that cannot decide, again in 32 digits.
     #[inline(always)]
     fn clip_leaf(&self, query: &mut Query, index: u32) {
         query.clips += 1;
@@ -283,14 +283,14 @@ impl Exact {
         Step::Done
     }
 
-    /// Offers the roots of a box where the ray touches a surface that bends, none or both; [`Step::Open`] where that does not tell.
+    /// Offers the roots of a box where the ray touches a surface that bends, none or both; [`Step::Open`] where that is undecided.
     #[cold]
     fn take_tangency(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node) -> Step {
         // The square around the box, and somewhat more, is what is looked at.
         let side = size(&node.rect).into_iter().fold(0.0, f64::max);
         let is_around =
             |p: [f64; 2]| (0..2).all(|k| (p[k] - 0.5 * (node.rect[k][0] + node.rect[k][1])).abs() <= side);
-        // Which of two roots a ray leaves that starts off them by rounding, 32 digits do not tell either.
+        // Which of two roots the ray leaves, when its start is off both by rounding, 32 digits do not decide either.
         if clipping.at_pole || clipping.departure.is_some_and(is_around) || query.budget < TANGENCY_WORK {
             return Step::Open;
         }
@@ -304,7 +304,7 @@ impl Exact {
     }
 
     /// Offers the middle of a box that touches the ray within rounding, unless the ray leaves it; [`Step::AskPrecise`] where 32 digits
-    /// may tell more.
+    /// may decide more.
     #[inline(always)]
     fn take_contact(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node) -> Step {
         let s = net::evaluate(&node.net, clipping.leaf.degree, 0.5, 0.5).s;
@@ -328,7 +328,7 @@ impl Exact {
     }
 
     /// Whether the ray, as far as a box reaches, runs along the surface that it leaves: nowhere higher over it than what its start is off
-    /// and rounding. What roots there are it cannot tell from the departure.
+    /// and rounding. The roots there cannot be distinguished from the departure.
     fn runs_along(&self, query: &Query, clipping: &Clipping<'_>, node: &Node) -> bool {
         let Some((own, [u, v])) = query.departure.zip(clipping.departure) else { return false };
         let control = clipping.leaf.net(&self.geometry.nets);

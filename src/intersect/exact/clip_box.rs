@@ -55,7 +55,7 @@ pub(super) fn halve(node: &Node, degree: [u8; 2], slopes: &Slopes, stack: &mut V
     let v_alike = across[1] < ALIKE * across[0];
     let u_first = v_alike || (across[0] >= ALIKE * across[1] && lengths[0] >= lengths[1]);
     let [size_u, size_v] = size(&node.rect);
-    // A side of the finest size stays: its two halves could no longer be told apart.
+    // A side of the finest size stays: its two halves would no longer differ.
     let direction = if (u_first && size_u > FINEST) || size_v <= FINEST { 0 } else { 1 };
     let [low, high] = net::halves(&node.net, degree, direction);
     let nearest = [range_along(&low).0, range_along(&high).0];

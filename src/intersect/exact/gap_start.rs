@@ -24,7 +24,7 @@ impl Exact {
     pub(super) fn gap_start(&self, query: &Query) -> Option<GapStart> {
         let own = query.departure.as_ref()?;
         let face = &self.geometry.faces[own.face as usize];
-        // One that is asked from farther on has passed what lies about its start: it would be given that again.
+        // A query with a later range is past what surrounds its start, and would be given that again.
         let is_at_start = query.t_min <= 0.0 && query.t_min <= query.limit;
         if !(face.gapes && is_at_start) || self.geometry.trims[face.trim as usize].cell_at(own.uv) != Region::Border
         {
@@ -101,7 +101,7 @@ impl Exact {
         // Beyond another of its edges, as in a notch or below a step, the face's surface goes on where nothing is.
         let metric = metric(patch.surface_tangents([du, dv]));
         let (ray, facing) = ([query.o, query.n1, query.n2], du.cross(dv).dot(query.d));
-        // Within the gaps of those edges, as at a corner, nothing is told of sides.
+        // Within the gaps of those edges, as at a corner, sides are unknown.
         let is_open = |near: &Near| {
             let edge_use = &trim.uses[near.owner as usize];
             let gap = bridged_gap(edge_use.gap, &met.placement);

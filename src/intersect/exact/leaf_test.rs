@@ -151,7 +151,7 @@ impl Exact {
         }
         let p = Vector::new(s[0], s[1], s[2]) / s[3];
         let t = query.d.dot(p - oc);
-        // While its place is open its t is as well: whether it is in range is asked of the settled root.
+        // While its place is open its t is as well: the range is checked on the settled root.
         let open = leaf.ill_scaled || settlement::needs_settling([u, v], margins);
         if !open && !query.is_in_range(t) {
             return;

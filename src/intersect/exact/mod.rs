@@ -10,9 +10,9 @@
 //!
 //! Guarantee: a hit marked [`Certainty::Certified`] is the first one on the spline as given in `f64`, with margins counted
 //! operation by operation, up to 1e-6 mm along trims, where the side of the edge shared by two faces decides for both.
-//! Where a ray runs along a surface or touches it within the rounding of `f64`, its leaf is looked at in 32 digits, which tell none or two
-//! roots where the surface bends. Contact closer than 1e-9 mm, or of less than a millimetre of patch the same share, that these leave
-//! open is [`Certainty::Tangent`]; what the budget or a singular point left open is [`Certainty::Uncertified`].
+//! Where a ray runs along a surface or touches it within the rounding of `f64`, its leaf is examined in 32 digits, which decide between
+//! none and two roots where the surface bends. Contact closer than 1e-9 mm, or of less than a millimetre of patch the same share, that
+//! these leave open is [`Certainty::Tangent`]; what the budget or a singular point left open is [`Certainty::Uncertified`].
 //!
 //! Known weakness: at collapsed edges (poles) no single step can decide, and rays within about 1e-9 mm of one stay uncertified.
 //!

@@ -229,7 +229,7 @@ impl DeparturePoint {
     /// The departure in the leaf's parameters, which may lie far outside of it; `None` on another face, and on another patch unless it lies
     /// on the common border and that patch goes on there as its own does. `origin` is the ray's.
     pub(super) fn local_to(&self, leaf: &Leaf, origin: Point, geometry: &Geometry) -> Option<[f64; 2]> {
-        // Parameters of another face say nothing here; seams and poles are told by place, in `is_same_point`.
+        // Parameters of another face say nothing here; seams and poles are recognised by position, in `is_same_point`.
         if leaf.face != self.face {
             return None;
         }

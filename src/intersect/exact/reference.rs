@@ -1,4 +1,4 @@
-//! The spline as it was given, in numbers of 32 digits: where `f64` cannot tell, this does.
+//! The spline as it was given, in numbers of 32 digits: for decisions that `f64` leaves open.
 //!
 //! De Boor's algorithm on the surface's own knots and control points, so that neither the extraction of Bézier patches nor their
 //! halving has rounded anything. The ray is met where two components of `(S − o) × d` vanish, which no rounding of a frame

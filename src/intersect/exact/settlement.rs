@@ -2,7 +2,7 @@
 //!
 //! A root found in `f64` is right to its margin: rounding across the ray over the sine at which the ray meets the leaf. Where the margin
 //! reaches over the leaf's border the root may be another leaf's, or lie beside the face; where it is large, t is as open. Such roots
-//! are few, and are found again in 32 digits. What these cannot tell either is flagged, never certified.
+//! are few, and are found again in 32 digits. What these leave open too is flagged, never certified.
 
 use super::acceptance::Candidate;
 use super::leaf::{Leaf, border_sides};
@@ -97,7 +97,7 @@ impl Exact {
     /// within that of a leaf is on the face to the accuracy that a hit promises.
     ///
     /// Over a seam the surface comes back with control points of its own, rounded on their own: between both lies a crack as high as their
-    /// rounding, and a ray at a small sine passes it over a way of up to the margin. Whether it is meant to, nothing tells.
+    /// rounding, and a ray at a small sine passes it over a way of up to the margin. Nothing shows whether it is meant to.
     fn place_on_leaf(&self, leaf: &Leaf, patch: &Patch, margin: [f64; 2], (uv, local): (Uv, [f64; 2])) -> Place {
         let reach = leaf.reach;
         let beyond = [0, 1].map(|k: usize| [reach[k][0] - local[k], local[k] - reach[k][1]]);
@@ -131,7 +131,7 @@ impl Exact {
         }
     }
 
-    /// Offers a root that nothing tells as uncertified, and leaves the ray undecided from two radii of the leaf before it on.
+    /// Offers a root that cannot be settled as uncertified, and leaves the ray undecided from two radii of the leaf before it on.
     fn leave_open(&self, query: &mut Query, index: u32, found: Candidate) {
         let leaf = &self.leaves[index as usize];
         // Two radii before the root: no point of the leaf lies nearer.

@@ -30,7 +30,7 @@ const LEAST_SINE_SQUARED: f64 = 1e-20;
 const LEAST_SINE: f64 = 1e-10;
 /// Ulps of the origin's largest coordinate within which a ray passes a vertex.
 const VERTEX_ROUNDING: f64 = 256.0;
-/// Directions at a vertex are chords over this part of the edge, which tells edges apart that touch there.
+/// Directions at a vertex are chords over this part of the edge, which separates edges that touch there.
 const CHORD: f64 = 1.0 / 1024.0;
 
 /// How a ray passes an edge.
@@ -83,7 +83,7 @@ fn nearest_passage(curve: &Curve, near: f64, [o, n1, n2]: [Vector; 3]) -> Option
 }
 
 impl Geometry {
-    /// Whether a root of a face near its trims counts, by the sides of the shared edges; `None` where no edge can tell.
+    /// Whether a root of a face near its trims counts, by the sides of the shared edges; `None` where no edge can decide.
     ///
     /// The ray comes as its origin and the two directions across it, in the world. `facing` has the sign of `(Su × Sv) · d` at the root,
     /// `near` are the uses about it.
@@ -160,8 +160,8 @@ impl Geometry {
     }
 
     /// Whether a ray, in the part's coordinates, through a vertex falls into one of the face's sectors there; `None` when it passes no
-    /// vertex, or one with a corner that tells nothing: the ray runs along an edge of it, or nothing else bounds the face there. What
-    /// other corners told is dropped then, and the nearest edge is left to decide.
+    /// vertex, or one with a corner that decides nothing: the ray runs along an edge of it, or nothing else bounds the face there. What
+    /// other corners decided is dropped then, and the nearest edge is left to decide.
     ///
     /// Directions are compared, never subtracted: whatever their rounding, each falls into exactly one of the sectors about a
     /// vertex.

@@ -18,7 +18,7 @@ const SLACK: f32 = 1.0 + 16.0 * f32::EPSILON;
 /// A ray that runs along a plane is taken to cross it at this slope, so that no reciprocal is infinite; over 1e12 mm it moves
 /// nothing by more than the slack.
 const LEAST_SLOPE: f64 = 1e-30;
-/// Share of the scene by which the box around it is widened before rays are clipped to it: `f32` cannot tell less.
+/// Share of the scene by which the box around it is widened before rays are clipped to it: `f32` resolves no less.
 const WIDENED: f64 = 1e-6;
 /// Ulps of the largest coordinate by which that box is widened at least: sixteen times what shifts and reciprocals round.
 const WIDENED_ULPS: f64 = 64.0;

@@ -1,4 +1,4 @@
-//! Small boxes in which the ray touches the surface: none, or both of its roots, told by 32 digits.
+//! Small boxes in which the ray touches the surface: none, or both of its roots, decided in 32 digits.
 //!
 //! At a contact the Jacobian is singular and no box proves itself, however small. But where the surface bends along the ray there are two
 //! roots at most, and how far the ray passes above or below says which. Let f be the map to the plane across the ray, its components turned
@@ -12,7 +12,7 @@
 //! * Where φ̂ < 0 < m, φ is convex and has two zeros at most: both are found by Newton's method from either side of x̂. The curve between
 //!   two roots stays in the box where it strays from its chord by less than the room that is left around them.
 //!
-//! φ̂ and φ̂′ are computed in 32 digits on the surface as given: they tell heights of 1e-25 mm.
+//! φ̂ and φ̂′ are computed in 32 digits on the surface as given: they resolve heights of 1e-25 mm.
 
 use super::clip_hull::SeenLeaf;
 use super::double_double::DoubleDouble;
@@ -38,7 +38,7 @@ const SHARED: f64 = 1e-9;
 const LEAST_BEND: f64 = 0.1;
 /// Steps towards the place where the ray runs along the surface.
 const DESCENT_STEPS: usize = 12;
-/// Rays that pass a surface farther off than this many contacts and margins are told by halving, in a tenth of the time.
+/// Rays that pass a surface farther off than this many contacts and margins are decided by halving, in a tenth of the time.
 const NEAR_CONTACTS: f64 = 4.0;
 const NEAR_MARGINS: f64 = 1e3;
 /// Where the curve is met well enough, as a share of the box: its square is below 32 digits.
@@ -75,7 +75,7 @@ struct Heights {
     dh: [f64; 2],
 }
 
-/// The roots in a box where the ray touches the surface; `None` where that does not tell.
+/// The roots in a box where the ray touches the surface; `None` where that is undecided.
 ///
 /// The box is one of a leaf's parameters. What it takes is charged to the query's budget.
 pub(super) fn roots(

@@ -28,7 +28,7 @@ pub(super) const TANGENT: f64 = 1e-9;
 /// of a millimetre and more have [`TANGENT`].
 const TANGENT_SHARE: f64 = 1e-9;
 /// Along the ray a contact smears over this many times [`contact_distance`]: a circle whose radius is half the size of a patch rises 1e-9
-/// of that over a chord of 6e-5, and boxes that are shorter than 1e-6 of it can hold no second contact that would be told from the first.
+/// of that over a chord of 6e-5, and boxes that are shorter than 1e-6 of it can hold no second contact distinct from the first.
 pub(super) const CONTACT_LENGTH: f64 = 1e3;
 
 /// Share of a patch's size by which a start may miss the point that it says it leaves: of a start that is rounded on its way from a source
@@ -63,7 +63,7 @@ pub(super) const INVERSE_ROUNDING: f64 = 1e-6;
 /// keeps four digits of sixteen.
 pub(super) const PARALLEL: f64 = 1e-12;
 
-/// Rays this near to a vertex are told by sectors, mm: what rounds the sides there is a thousandth of it.
+/// Rays this near to a vertex are classified by sectors, mm: the rounding of the sides there is a thousandth of it.
 pub(super) const VERTEX_RADIUS: f64 = 1e-9;
 /// Distance, as a share of the size of what is looked at, below which points of a model are the same: files carry nine digits.
 pub(super) const SAME_POINT: f64 = 1e-9;

@@ -200,7 +200,7 @@ impl Trim {
     }
 
     /// Whether `q`, which lies in a border cell, is inside, as [`Self::locate`] says too: no certificate hangs on a polished root, so that
-    /// no edge near it is asked for, nor the metric that this takes.
+    /// no edge near it is looked up, nor the metric that this needs.
     #[inline(never)]
     pub(super) fn is_inside(&self, q: Uv) -> bool {
         self.parity(q, *self.cell_range(q.y, q.y, 1).start())

@@ -1,14 +1,15 @@
 //! Parts that are placed often: one structure for each, and a tree of boxes over their places.
 //!
 //! A ray is moved into the coordinates of every part whose box it crosses, and the hit back. Frames turn and shift, so that a distance
-//! along the ray is the same in all of them. Rays of a batch that come to places of one part are asked there together, wherever these are.
+//! along the ray is the same in all of them. Rays of a batch that reach placements of one part are traced there together, wherever these
+//! are.
 //!
-//! A ray that leaves a placement is asked there first: where that one's box meets no other's, a hit in it is the nearest.
+//! A ray that leaves a placement is traced there first: where its box meets no other's, a hit in it is the nearest.
 //!
 //! Guarantee: the nearest hit of all groups, of equal ones that of the first group, then of the first placement; the same bits for a
 //! single ray and a batch. A hit depends on ray, part and place alone, not on what else the scene holds, but for its certainty: none is
-//! certified where another place that the ray was asked of fell back. Inside a part nothing changes: a ray is moved once, so that facets
-//! which meet there meet here, and what it leaves is known by part and place.
+//! certified where another placement that the ray was traced in fell back. Inside a part nothing changes: a ray is moved once, so that
+//! facets which meet there meet here, and what it leaves is known by part and place.
 //! Known weakness: nothing is worked out about expected rays of what is placed; and a start that is computed in the scene is rounded there,
 //! so that the structures of parts must know how far away they stand (`farthest_start` of their settings).
 
@@ -106,7 +107,7 @@ impl<'a> Instanced<'a> {
             }
             self.ask(work, cost);
         }
-        // A ray counts once, wherever it was asked.
+        // A ray counts once, wherever it was traced.
         let walks = &work.walks[..rays.len()];
         cost.rays = before.rays + rays.len() as u64;
         cost.fallbacks = before.fallbacks + walks.iter().filter(|walk| walk.fell_back).count() as u64;
@@ -129,7 +130,7 @@ impl<'a> Instanced<'a> {
         if cost.fallbacks == before {
             return SmallVec::new();
         }
-        // Rare, and a miss does not say which ray it was: each is asked once more, by itself.
+        // Rare, and a miss does not say which ray it was: each is traced once more, by itself.
         let falls_back = |ray: &Ray| {
             let mut cost = Cost::default();
             self.groups[group].intersect(ray, &mut cost);
@@ -146,8 +147,7 @@ impl<'a> Instanced<'a> {
         })
     }
 
-    /// Turns a walk to a ray before it is asked anywhere, with the placement that it leaves as the first to ask, unless it is known to be
-    /// free of it.
+    /// Sets a walk to a new ray, with the placement that the ray leaves as the first to query, unless it is known to be free of it.
     fn depart(&self, walk: &mut Walk, ray: &Ray) {
         (walk.ray, walk.departure, walk.best, walk.fell_back) = (*ray, self.own_departure(ray), None, false);
         walk.boxes.end();

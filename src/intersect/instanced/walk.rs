@@ -15,7 +15,7 @@ pub(super) struct Walk<'t> {
     pub(super) boxes: BoxWalk<'t>,
     /// Of the first group, or of a placement.
     pub(super) best: Option<(Option<u32>, Hit)>,
-    /// The placement where the ray is asked next; `None` once it has passed all boxes.
+    /// The placement to query next; `None` once it has passed all boxes.
     pub(super) next: Option<u32>,
     /// Whether some structure fell back on it: what that missed may be nearer.
     pub(super) fell_back: bool,
@@ -44,7 +44,7 @@ pub(super) struct Workspace<'t> {
 /// A list that asks for no memory where a ray is alone.
 type Few<T> = SmallVec<[T; 1]>;
 
-/// A ray that is asked of a placement.
+/// A ray that is traced in a placement.
 pub(super) struct Question {
     pub(super) group: usize,
     pub(super) place: u32,
@@ -106,7 +106,7 @@ impl Kernel for Advance<'_, '_> {
 
 impl Walk<'_> {
     /// Sets `next` to the placement of the next box that the ray enters before its hit; false where there is none. The placement that the
-    /// ray leaves is passed over, because it was asked first.
+    /// ray leaves is passed over, because it was queried first.
     #[inline(always)]
     fn advance(&mut self) -> bool {
         let own = self.departure.and_then(|from| from.place);

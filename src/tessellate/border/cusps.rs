@@ -50,7 +50,7 @@ fn untangle(polygon: &mut [PolygonVertex], corner: usize, scale: Uv, limit: f64,
     if ahead[1].dot(back[1]) <= CUSP * ahead[1].length() * back[1].length() {
         return;
     }
-    // Where they are clearly apart, it is told on which side of the other each belongs.
+    // Where they are clearly apart, the side of the other on which each belongs is known.
     let apart = |line: &[Uv], points: &[Uv]| {
         points.iter().map(|&p| Foot::on_line(p, line).away).find(|away| away.abs() > limit)
     };

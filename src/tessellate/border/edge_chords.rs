@@ -49,7 +49,7 @@ fn chord_tolerance(side: &EdgeSide<'_, '_>, t: f64, along: Vector) -> f64 {
     let uv = surface.spline.clamp(side.edge_use.uv.evaluate(t));
     let xi = surface.tolerance(uv);
     let d = surface.second_derivatives(uv);
-    // At poles and cusps no curvature tells; half of it is what a surface that bends across is given at least.
+    // At poles and cusps the curvature is unknown; half of it is what a surface that bends across is given at least.
     let Some(forms) = FundamentalForms::new(&d) else { return 0.5 * xi };
     // The direction across, in parameters: orthogonal to `along` in the tangent plane.
     let across = forms.normal.cross(along);

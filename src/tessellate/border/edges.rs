@@ -23,7 +23,7 @@ pub(in crate::tessellate) struct Division {
     pub(in crate::tessellate) first: u32,
 }
 
-/// What an edge has by itself, before others have a say: how much denser than usual it was asked to be, and its parameters.
+/// What an edge has by itself, before others have a say: how much denser than usual it is to be, and its parameters.
 #[derive(Clone, Debug)]
 pub(in crate::tessellate) struct OwnDivision {
     denser: u32,
@@ -51,7 +51,7 @@ pub(in crate::tessellate) fn divide(
     *own = part.edges.par_iter().zip(sides).enumerate().map(divide_alone).collect();
     // Then edges that others have a say in.
     let mut times: Vec<Vec<f64>> = own.iter().map(|o| o.t.clone()).collect();
-    // Each on what the one before has left: twins are told apart when all else is done.
+    // Each on what the one before has left: twins are separated when all else is done.
     opposite_sides::equalise(part, faces, sides, denser, &mut times);
     open_lenses(part, faces, &mut times);
     separate_twins(part, sides, &mut times);

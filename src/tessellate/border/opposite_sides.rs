@@ -244,6 +244,6 @@ fn transfer_samples(times: &[f64], from: &EdgeUse, to: &EdgeUse, d: usize, [t0, 
     out.insert(0, t0);
     out.push(t1);
     let least = SAME_SAMPLE * (t1 - t0);
-    // Samples that coincide or turn back tell that the uv curve does not run one way.
+    // Samples that coincide or turn back show that the uv curve does not run one way.
     out.windows(2).all(|w| w[1] - w[0] > least).then_some(out)
 }

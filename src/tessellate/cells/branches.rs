@@ -162,7 +162,7 @@ mod tests {
         assert!(of_both > steps && of_both < steps + steps / 4, "{steps} {of_both}");
     }
 
-    /// A wall of kilometres across a thousand-millionth of the sheet: no cell is thinner than what parameters tell apart, and the result
+    /// A wall of kilometres across a thousand-millionth of the sheet: no cell is thinner than parameters can resolve, and the result
     /// says that not all fit.
     #[test]
     fn cells_are_no_thinner_than_parameters_tell_apart() {

@@ -98,7 +98,7 @@ impl CandidateFacet {
     ) -> usize {
         let [mut u, mut v] = self.sag;
         // A profile like an S passes through the middle of its chord: by the middle alone a trumpet was cut into 100,000 columns, and
-        // never across. Where middles do not tell why a cell fails, quarters are looked at.
+        // never across. Where middles do not show why a cell fails, quarters are examined.
         if u.max(v) <= limit {
             let share = |d: usize, share: f64| cell.lo[d] + (cell.hi[d] - cell.lo[d]) * share;
             let quarters = |d: usize| self.middle_line_sag(surface, cell, d, QUARTERS.map(|q| share(d, q)));

@@ -10,7 +10,7 @@ const MAX_BRIDGE: usize = 3;
 /// Share of a cell's size within which hanging vertices face each other.
 pub(super) const FACING: f64 = 0.15;
 
-/// A place for a further node on side `side`, 0 to 3 as in [`Cell::corners`], of cell `cell` of the list that was asked about.
+/// A place for a further node on side `side`, 0 to 3 as in [`Cell::corners`], of cell `cell` of the queried list.
 pub(super) struct Bridge {
     pub(super) cell: usize,
     pub(super) side: usize,

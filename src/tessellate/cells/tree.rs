@@ -49,7 +49,7 @@ pub(super) struct Tree<'s, 'a> {
     preferred: [Vec<f64>; 2],
     /// A cell must be shorter than this, in u and v: half of a direction in which the face comes back to where it began, else infinite.
     longest: Uv,
-    /// Largest angle between a facet and its normals, radians; `None` where none was asked for.
+    /// Largest angle between a facet and its normals, radians; `None` where none was requested.
     max_angle: Option<f64>,
 }
 
@@ -192,7 +192,7 @@ impl Tree<'_, '_> {
             && let Some((bound, tolerance)) = self.prove_fit(branch, cell, &candidate)
         {
             // At the border the samples' aligned sides let a cell be whole; else the transition takes it, and this
-            // one only told the size.
+            // one only gave the size.
             if inside || self.is_aligned(cell, &near) && self.contains(cell.center()) {
                 let (first, places) = (candidate.first_corner(), candidate.places());
                 let slack = branch.slack;

@@ -1,4 +1,4 @@
-//! Whether facets fill their border without gap or overlap, told by how often each side of a facet is used.
+//! Whether facets fill their border without gap or overlap, decided by how often each side of a facet is used.
 
 use crate::tessellate::face_mesh::FaceMesh;
 use crate::tessellate::nodes::Position;

@@ -69,7 +69,7 @@ pub(super) fn contacts<'m>(
     };
     let mut trimmed: FxHashMap<FaceKey, TrimmedFace<'m>> = keys.par_iter().filter_map(trimmed).collect();
     let carried = |&[a, b]: &[FaceKey; 2]| {
-        // The face with the lower key is asked first, so that the carrier does not depend on chance.
+        // The face with the lower key comes first, so that the carrier does not depend on chance.
         let (x, y) = (trimmed.get(&a)?, trimmed.get(&b)?);
         if x.carries(y, glue) {
             Some(Contact { carrier: a, guest: b, extent: Extent::Whole })

@@ -82,7 +82,7 @@ impl<'f, 'm> Guest<'f, 'm> {
             if extent == Extent::Part && ![middle, self.places[i], self.places[j]].iter().all(is_on_carrier) {
                 continue;
             }
-            // The middle is on no seam: it tells on which side of one the ends are.
+            // The middle is on no seam: it shows on which side of one the ends are.
             let (middle, _) = carrier.projector.project(local(middle));
             let end = |vertex: usize, place: Point| {
                 let (uv, _) = carrier.projector.project(place);

@@ -281,8 +281,8 @@ impl<'j, 'm> Joiner<'j, 'm> {
         let made = mesh_with_imprint(&self.input(carrier, carrier_mesh), &imprint);
         let (mesh, facets) = match made {
             Ok((mut mesh, facets)) if facets.holds_imprint => {
-                // The facets were made tighter for the guests' sake; what was asked of this face is what they are
-                // measured by.
+                // The facets were made tighter for the guests' sake; they are measured
+                // by the tolerance requested for this face.
                 for f in &mut mesh.facets {
                     f.tolerance = carrier.asked_tolerance(f, &mesh.corners);
                 }
@@ -339,7 +339,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
             let imprinted = ImprintedPoints { points, near };
             polygons::build(face.part, &face.loops, &face.surface, &mesh.divisions, &imprinted)
         };
-        // First without: only the border's corners tell where its seams run.
+        // First without: only the border's corners show where its seams run.
         let polygons = build(&[]);
         let mut points = Vec::new();
         for p in &polygons.polygons {

@@ -55,7 +55,7 @@ impl<'s> Projector<'s> {
         Self { spline, seeds, poles, spacing, bounds }
     }
 
-    /// Whether no place of the surface is within `distance` of `p`, as far as its box and the seeds tell.
+    /// Whether no place of the surface is within `distance` of `p`, judged by its box and the seeds.
     pub(super) fn is_beyond(&self, p: Point, distance: f64) -> bool {
         // Twice the distance off the box, so that no rounding decides.
         if !self.bounds.grown(2.0 * distance).contains(p) {

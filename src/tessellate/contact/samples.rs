@@ -16,7 +16,7 @@ const ON_SEAM: f64 = 1e-7;
 /// Share of the tolerance that chords of a border take inside the other face: the facets on both sides of it have the rest. At 0.87 of it
 /// a carrier came to 4,600 facets in place of 25.
 const CHORD_SHARE: f64 = 0.5;
-/// Pieces of each chord whose ends are asked whether they lie on the other face.
+/// Pieces of each chord whose ends are tested for lying on the other face.
 const CROSSING_PIECES: usize = 8;
 /// Steps from one edge to the other and back that find where they cross: each takes the square of the cosine between them.
 const CROSSING_STEPS: usize = 60;
@@ -137,7 +137,7 @@ impl EdgeSamples<'_, '_> {
 
     /// Asks for samples on both edges where one of this face crosses one of another into it or out of it.
     pub(super) fn cross_edges(&self, other: &EdgeSamples<'_, '_>, glue: f64, samples: &mut ContactSamples) {
-        // Where seams are crossed is asked for elsewhere.
+        // Where seams are crossed is determined elsewhere.
         let rims = other.face.rims();
         if rims.is_empty() {
             return;

@@ -34,7 +34,7 @@ pub(super) struct TrimmedFace<'m> {
     pub(super) frame: &'m Frame,
     /// With its tolerance, which contacts may tighten.
     pub(super) surface: FaceSurface<'m>,
-    /// The tolerance that was asked of it.
+    /// The tolerance that was requested for it.
     pub(super) asked: ToleranceField,
     pub(super) loops: Vec<TrimLoop>,
     pub(super) polygons: BorderPolygons,
@@ -85,7 +85,7 @@ impl<'m> TrimmedFace<'m> {
         Some(out)
     }
 
-    /// Returns the tolerance, mm of the part, that was asked where a facet of this face lies, whatever contacts held it to. `corners` are
+    /// Returns the tolerance, mm of the part, requested where a facet of this face lies, whatever contacts held it to. `corners` are
     /// those of its mesh.
     pub(super) fn asked_tolerance(&self, facet: &MeshedFacet, corners: &[Corner]) -> f64 {
         let own_share = self.asked.tighter(&self.asked, CARRIER_SHARE);
@@ -115,7 +115,7 @@ impl<'m> TrimmedFace<'m> {
     }
 
     /// Whether `uv` lies inside the polygons of the border's chords: within a chord's sag of the trim it may say either, which
-    /// [`Self::is_at_border`] tells. Periods are not taken into account.
+    /// [`Self::is_at_border`] decides. Periods are not taken into account.
     pub(super) fn contains(&self, uv: Uv) -> bool {
         let sides =
             self.polygons.polygons.iter().flat_map(|p| (0..p.len()).map(|i| [p[i].uv, p[(i + 1) % p.len()].uv]));
@@ -174,13 +174,13 @@ impl<'m> TrimmedFace<'m> {
         let holds = |on: &Self, of: &Self| {
             let edges = on.edges();
             let mut inside = of.samples[of.border_samples..].iter();
-            // Most faces whose boxes meet do not touch: the seeds tell, before any nearest point is looked for.
+            // Most faces whose boxes meet do not touch: the seeds show it before any nearest point is computed.
             inside.any(|&p| !on.is_beyond(p, glue) && on.holds_inside(&edges, p, glue))
         };
         holds(self, other) || holds(other, self)
     }
 
-    /// Whether a place is farther from the surface than this, mm, as far as the seeds of the projector tell.
+    /// Whether a place is farther from the surface than this, mm, judged by the seeds of the projector.
     fn is_beyond(&self, p: Point, mm: f64) -> bool {
         self.projector.is_beyond(self.frame.local_point(p), mm / self.frame.scale.abs())
     }

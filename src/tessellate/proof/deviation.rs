@@ -163,7 +163,7 @@ impl DeviationBounds {
             let start = self.stack.len() - size;
             let net = &self.stack[start..];
             let worst = linear.bound(net, lightest);
-            // Parts beside the region bound nothing that is asked for.
+            // Parts outside the region bound nothing of interest.
             if worst <= limit || !linear.meets_region(from, share) {
                 most = if worst <= limit { most.max(worst) } else { most };
                 self.stack.truncate(start);

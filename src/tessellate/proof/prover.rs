@@ -278,7 +278,7 @@ impl<'s, 'a> Prover<'s, 'a> {
     /// chord; above `limit` none is known.
     pub(in crate::tessellate) fn side_bound(&mut self, uv: [Uv; 2], xyz: [Point; 2], limit: f64) -> f64 {
         // A corner that the file's gap has moved off the piece is that far from it, in whatever direction: along the side the chord itself
-        // would not tell.
+        // would not show it.
         let moved = [0, 1].map(|i| (self.surface.point(uv[i]) - xyz[i]).length());
         let gap = moved[0].max(moved[1]) + self.margin;
         if self.surface.affine || gap > limit {
@@ -331,7 +331,7 @@ impl<'s, 'a> Prover<'s, 'a> {
     fn taylor_bound(&self, uv: &[Uv], limit: f64, away: impl Fn(Point) -> f64) -> Option<f64> {
         let (lo, hi) = uv_bounds(uv);
         let (a, b) = (self.surface.range(0, lo.x, hi.x), self.surface.range(1, lo.y, hi.y));
-        // The limit is asked for before the corners are evaluated, which costs more.
+        // The limit is computed before the corners are evaluated, which costs more.
         let bound = self.surface.curving.linear_deviation(a, b, hi - lo).filter(|&x| x <= limit)?;
         let at_corners = uv.iter().map(|&x| away(self.surface.point(x))).fold(0.0, f64::max);
         Some(bound + at_corners + self.margin).filter(|&x| x <= limit)

@@ -100,7 +100,7 @@ pub(in crate::tessellate) fn pair_triangles(
     join_sectors(nodes, fixed, prover, facets)
 }
 
-/// Lists all pairs of triangles that may be joined, triangles without area first, then the squarest quads. `collapsed` tells by triangle
+/// Lists all pairs of triangles that may be joined, triangles without area first, then the squarest quads. `collapsed` says by triangle
 /// whether it has no area.
 fn candidates(
     transition: &Transition,

@@ -127,7 +127,7 @@ impl DelaunayMesh<'_, '_> {
     /// surface.
     fn can_gain(&self, f: &ProvedFacet<3>, chords: &BorderChords) -> bool {
         let t = f.nodes;
-        // A chord stays as it is: no triangle on it can hold whose tolerance it strays beyond. Shorter chords are asked for instead, which
+        // A chord stays as it is: no triangle on it can hold whose tolerance it strays beyond. Shorter chords are requested instead, which
         // at a cone's apex, where the tolerance tightens, takes a tenth of the facets that rings of places between took.
         let strays = |k: usize| {
             let chord = chords.get(&edge_key(t[k], t[(k + 1) % 3]));

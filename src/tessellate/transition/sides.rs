@@ -19,7 +19,7 @@ pub(super) struct Sides {
     inside: Vec<Option<bool>>,
     /// Vertices that the triangulation had then.
     vertices: usize,
-    /// Faces that were asked, and sides that were looked at for it, since the beginning.
+    /// Faces that were queried, and sides that were examined for it, since the beginning.
     asked: usize,
     looked: usize,
 }

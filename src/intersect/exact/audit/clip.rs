@@ -41,9 +41,9 @@ impl View {
 
 /// Steps for a patch and a ray: a simple root takes about ten, a graze hundreds.
 const CLIPPING_STEPS: u32 = 4000;
-/// Boxes smaller than this part of a patch are asked whether their root is single.
+/// Boxes smaller than this part of a patch are tested for a single root.
 const SMALL: f64 = 0.02;
-/// Boxes are asked over this much more at least, as parts of a patch, so that rounding leaves something on all sides.
+/// The test covers at least this much more than the box, as parts of a patch, so that rounding leaves something on all sides.
 const LEAST_SURROUNDINGS: f64 = 1e-7;
 /// Share of a patch by which a root may lie beyond its box beside what rounding across the ray moves it: boxes that share a border
 /// both take a root on it.

@@ -1,6 +1,6 @@
 //! Where clipping has come down to a small box with one root at most, that root: for the audit path.
 //!
-//! Around a root, rounding leaves boxes side by side that clipping cannot tell apart. Over a box so small the Jacobian hardly
+//! Around a root, rounding leaves boxes side by side that clipping cannot separate. Over a box so small the Jacobian hardly
 //! varies: when, preconditioned by the inverse of its middle, it deviates from the identity by less than 1, the map from
 //! parameters to the plane across the ray is injective (its root is single), and Newton's method finds it.
 
