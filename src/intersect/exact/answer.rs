@@ -1,7 +1,7 @@
 //! What a search has found, as a hit with its certificate, and the searches that callers ask for.
 
 use super::leaf_test;
-use super::patch;
+use super::patch::{self, Patch};
 use super::query::{Query, Root};
 use super::structure::Exact;
 use super::tolerances::{CONTACT_LENGTH, contact_distance};
@@ -94,8 +94,8 @@ impl Exact {
             if root.t >= query.undecided_from {
                 hit.certainty = Certainty::Uncertified;
             }
-            let contact = contact_distance(self.geometry.patches[hit.primitive as usize].size());
-            if !repeats(&hits, &hit, root.certainty, ray, contact) {
+            let patch = &self.geometry.patches[hit.primitive as usize];
+            if !repeats(&hits, &hit, root.certainty, ray, patch) {
                 hits.push(hit);
             }
         }
@@ -203,16 +203,18 @@ impl Exact {
     }
 }
 
-/// Whether a crossing repeats one of `hits`, in order of t: the same face at the same place with the same side towards the ray; where both
-/// are uncertified they may lie farther apart. `certainty` is that of the crossing's root, `contact` the [`contact_distance`] of its patch.
-fn repeats(hits: &[Hit], hit: &Hit, certainty: Certainty, ray: &Ray, contact: f64) -> bool {
+/// Whether a crossing on this patch repeats one of `hits`, in order of t: the same face at the same place with the same side towards the
+/// ray; where both are uncertified they may lie farther apart. `certainty` is that of the crossing's root.
+fn repeats(hits: &[Hit], hit: &Hit, certainty: Certainty, ray: &Ray, patch: &Patch) -> bool {
     let direction = ray.direction;
     let placed = SAME_CROSSING_PLACED * f64::EPSILON * ray.origin.abs().max_element();
-    let close = contact + SAME_CROSSING_FAR * hit.t.abs() + placed;
-    // At a pole clipping ends on boxes a contact wide across the ray, as often as patches meet there: along the ray they differ by
-    // that over the sine.
+    let contact = contact_distance(patch.size());
     let sine = hit.geometric_normal.dot(direction).abs();
-    let smeared = close + (2.0 * contact / sine).min(CONTACT_LENGTH * contact);
+    // What is off across the ray is that over the sine along it: by the rounding of control points where both are certified. At a pole
+    // clipping ends on boxes a contact wide, as often as patches meet there.
+    let along = |across: f64| (across / sine).min(CONTACT_LENGTH * contact);
+    let apart = contact + SAME_CROSSING_FAR * hit.t.abs() + placed;
+    let (close, smeared) = (apart + along(patch.rounding), apart + along(2.0 * contact));
     let open = |c: Certainty| c == Certainty::Uncertified;
     let leaves = |h: &Hit| h.geometric_normal.dot(direction) > 0.0;
     hits.iter().rev().take_while(|h| hit.t - h.t <= smeared).any(|h| {
