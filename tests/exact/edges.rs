@@ -234,6 +234,24 @@ fn cylinder() -> Model {
 /// Depth below the side, mm, from which a ray through the rim is no matter of the band along it, which is half as wide.
 const CLEAR_MM: f64 = 2e-6;
 
+/// Rays across the cylinder along its upper cap, a little below: they enter and leave by the side, and nothing is left open.
+#[test]
+fn rays_along_a_cap_pass_it() {
+    let exact = Exact::build(&cylinder(), &Settings::default());
+    let mut s = Random(5);
+    for k in 0..8000 {
+        let (sin, cos) = s.within(0.0, std::f64::consts::TAU).sin_cos();
+        let (direction, aside) = (Vector::new(cos, sin, 0.0), Vector::new(-sin, cos, 0.0));
+        let offset = s.within(-9.5, 9.5);
+        let place = offset * aside + (10.0 - [2e-6, 4e-6, 1e-5][k % 3]) * Vector::Z;
+        let ray = Ray::new(place - 30.0 * direction, direction);
+        let answer = exact.first(&ray, &mut Cost::default());
+        assert_eq!(answer.certainty, Certainty::Certified, "{ray:?}");
+        let truth = 30.0 - (100.0 - offset * offset).sqrt();
+        assert!(answer.hit.is_some_and(|hit| (hit.t - truth).abs() < 1e-9), "{ray:?} {answer:?}");
+    }
+}
+
 #[test]
 fn rays_that_graze_a_border_meet_both_sheets_of_the_face_beside_it() {
     let exact = Exact::build(&cylinder(), &Settings::default());

@@ -8,11 +8,11 @@
 use super::acceptance::Candidate;
 use super::clip_box::{FINEST, Node, cut, halve, size};
 use super::clip_hull::{
-    Preconditioner, SeenLeaf, homogeneous_margin, hull, linear_hull, newton, precondition, range_along, seen_along,
-    tangent_frame,
+    Preconditioner, SeenLeaf, determinant, homogeneous_margin, hull, linear_hull, newton, precondition,
+    range_along, seen_along, tangent_frame,
 };
 use super::leaf::Leaf;
-use super::net::{self, Net};
+use super::net::{self, Net, V4};
 use super::patch::project;
 use super::query::Query;
 use super::settlement;
@@ -20,6 +20,7 @@ use super::structure::Exact;
 use super::tangency::{self, TANGENCY_WORK};
 use super::tolerances::{CONTACT_LENGTH, SAME_PARAMETER, TANGENT};
 use crate::intersect::Certainty;
+use crate::math::Vector;
 use crate::math::simd::{self, Instructions, Kernel};
 
 /// A leaf whose roots count no farther beyond its unit square than this is clipped over that alone: what lies beyond is within
@@ -92,6 +93,21 @@ pub(super) fn clip(exact: &Exact, query: &mut Query, leaf: u32) {
     simd::dispatch(LeafClipping { exact, query, leaf });
 }
 
+/// Directions across a query's ray, and a leaf's net as they and the ray see it: those of the query, but for a leaf that the ray runs
+/// along, in whose middle their Jacobian is singular. There they are [`tangent_frame`], by which a hull that lies beside the ray misses
+/// it however little: in any other frame only boxes as small as that distance do, and a budget ended on them.
+#[inline(always)]
+fn seen_leaf(query: &Query, control: &[V4], degree: [u8; 2], oc: Vector) -> ([Vector; 2], Net) {
+    let frame = [query.n1, query.n2];
+    let net = seen_along(frame, query.d, control, oc);
+    let slopes = net::slopes(&net, degree);
+    if determinant(&slopes).1 {
+        return (frame, net);
+    }
+    let frame = tangent_frame(&slopes, frame, query.d);
+    (frame, seen_along(frame, query.d, control, oc))
+}
+
 impl Exact {
     /// Looks for every root of the query on a leaf: in `f64`, and where that cannot decide, again in 32 digits.
     #[inline(always)]
@@ -99,11 +115,11 @@ impl Exact {
         query.clips += 1;
         let leaf = &self.leaves[index as usize];
         let oc = query.o - leaf.center;
-        let net = seen_along(query, leaf.net(&self.geometry.nets), oc);
+        let (frame, net) = seen_leaf(query, leaf.net(&self.geometry.nets), leaf.degree, oc);
         let noise = self.noise(leaf, oc);
         let homogeneous_margin = homogeneous_margin(leaf, &net, noise);
         let departure = query.departure.and_then(|own| own.local_to(leaf, query.o, &self.geometry));
-        let seen = &SeenLeaf { net, frame: [query.n1, query.n2], homogeneous_margin, precise: false };
+        let seen = &SeenLeaf { net, frame, homogeneous_margin, precise: false };
         let patch = || &self.geometry.patches[leaf.patch as usize];
         let at_pole =
             leaf.has_pole && self.geometry.passes_pole(patch(), [query.o, query.d], CONTACT_LENGTH * leaf.contact);
@@ -123,7 +139,7 @@ impl Exact {
     fn clip_precisely(&self, query: &mut Query, clipping: Clipping<'_>) {
         query.budget = query.budget.saturating_sub(PRECISE_WORK);
         let Clipping { index, leaf, seen, .. } = clipping;
-        let frame = tangent_frame(seen, leaf.degree, query.d);
+        let frame = tangent_frame(&net::slopes(&seen.net, leaf.degree), seen.frame, query.d);
         let reference = self.geometry.reference(&self.geometry.patches[leaf.patch as usize]);
         let net = reference.net_along([query.o, query.d], frame, leaf.rect);
         let reach = query.o.abs().max_element() + leaf.center.abs().max_element() + leaf.radius;

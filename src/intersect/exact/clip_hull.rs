@@ -2,7 +2,6 @@
 
 use super::leaf::Leaf;
 use super::net::{self, Net, Slopes, V4, by_degree};
-use super::query::Query;
 use super::tolerances::{INVERSE_ROUNDING, ROUND, SINGULAR};
 use crate::math::Vector;
 
@@ -83,17 +82,17 @@ pub(super) fn hull(net: &[V4], margin: [f64; 2]) -> Option<Hull> {
     Some(Hull { near, far, across: largest / least_weight.max(f64::MIN_POSITIVE) })
 }
 
-/// Turns control points about a leaf's centre into a net in the ray's frame (across, across, along, weight). `oc` is the ray's origin less
-/// that centre.
+/// Turns control points about a leaf's centre into a net in a ray's frame: two coordinates across, along `[n1, n2]`, one along its
+/// `direction`, and the weight. `oc` is the ray's origin less that centre.
 #[inline(always)]
-pub(super) fn seen_along(query: &Query, control: &[V4], oc: glam::DVec3) -> Net {
+pub(super) fn seen_along([n1, n2]: [Vector; 2], direction: Vector, control: &[V4], oc: Vector) -> Net {
     // The origin is taken off in homogeneous form, A − o·W, which stays linear in the control points: no division,
     // no further rounding.
-    let (k1, k2, kd) = (query.n1.dot(oc), query.n2.dot(oc), query.d.dot(oc));
+    let (k1, k2, kd) = (n1.dot(oc), n2.dot(oc), direction.dot(oc));
     let mut net = Net::from_slice(control);
     for p in &mut net {
-        let a = glam::DVec3::new(p[0], p[1], p[2]);
-        *p = [query.n1.dot(a) - k1 * p[3], query.n2.dot(a) - k2 * p[3], query.d.dot(a) - kd * p[3], p[3]];
+        let a = Vector::new(p[0], p[1], p[2]);
+        *p = [n1.dot(a) - k1 * p[3], n2.dot(a) - k2 * p[3], direction.dot(a) - kd * p[3], p[3]];
     }
     net
 }
@@ -117,28 +116,34 @@ fn halving_rounding(leaf: &Leaf) -> f64 {
     (SHIFT_ROUNDING + 2.0 * (f64::from(leaf.degree[0]) + f64::from(leaf.degree[1]))) * ROUND
 }
 
-/// Two unit vectors across a ray: one along the longer tangent of the leaf's middle as it is seen, the other across it. That coordinate is
-/// small all over a leaf that the ray runs along, and what is small is rounded by little.
-pub(super) fn tangent_frame(seen: &SeenLeaf, degree: [u8; 2], direction: Vector) -> [Vector; 2] {
-    let slopes = net::slopes(&seen.net, degree);
+/// Two unit vectors across a ray: one along the longer tangent of a net's middle, whose `slopes` are seen in this `frame`, the other across
+/// it. That coordinate is small all over a leaf that the ray runs along, and what is small is rounded by little.
+pub(super) fn tangent_frame(slopes: &Slopes, frame: [Vector; 2], direction: Vector) -> [Vector; 2] {
     let [[a, b], [c, d]] = [[slopes.u[0], slopes.u[1]], [slopes.v[0], slopes.v[1]]];
     let [x, y] = if a.hypot(b) >= c.hypot(d) { [a, b] } else { [c, d] };
-    let along = (seen.frame[0] * x + seen.frame[1] * y).normalize_or(seen.frame[0]);
+    let along = (frame[0] * x + frame[1] * y).normalize_or(frame[0]);
     [along, direction.cross(along)]
+}
+
+/// The determinant of the middle Jacobian of a net in a ray's frame, and whether it is more than rounding: else the ray runs along the
+/// surface there.
+#[inline(always)]
+pub(super) fn determinant(s: &Slopes) -> (f64, bool) {
+    let det = s.u[0] * s.v[1] - s.v[0] * s.u[1];
+    (det, det.abs() > SINGULAR * (s.u[0].abs() + s.v[0].abs()) * (s.u[1].abs() + s.v[1].abs()))
 }
 
 /// Inverts the middle Jacobian of a net in the ray's frame, whose coordinates across are off by up to `margin`, in homogeneous units;
 /// `None` where its determinant is zero. A nearly singular one has a deviation that counts its rounding.
 #[inline(always)]
 pub(super) fn precondition(s: &Slopes, degree: [u8; 2], margin: [f64; 2]) -> Option<Preconditioner> {
-    let det = s.u[0] * s.v[1] - s.v[0] * s.u[1];
+    let (det, regular) = determinant(s);
     if !(det.abs() > f64::MIN_POSITIVE) {
         return None;
     }
     let y = [[s.v[1] / det, -s.v[0] / det], [-s.u[1] / det, s.u[0] / det]];
     let row = |r: usize| y[r][0].abs() * (s.ru[0] + s.rv[0]) + y[r][1].abs() * (s.ru[1] + s.rv[1]);
     let slack = [0, 1].map(|r: usize| y[r][0].abs() * margin[0] + y[r][1].abs() * margin[1] + HULL_ROUNDING);
-    let regular = det.abs() > SINGULAR * (s.u[0].abs() + s.v[0].abs()) * (s.u[1].abs() + s.v[1].abs());
     // A derivative is off by twice the degree of what control points are off, and the inverse of a nearly singular Jacobian by no more.
     let blur = if regular { 0.0 } else { 4.0 * f64::from(degree[0].max(degree[1])) * slack[0].max(slack[1]) };
     Some(Preconditioner { inverse: y, deviation: row(0).max(row(1)) + INVERSE_ROUNDING + blur, slack })
