@@ -218,6 +218,9 @@ def _corners(name: str, normals: npt.ArrayLike, facets: int) -> FloatArray:
         given = given[:, [0, 1, 2, 2]]
     if given.shape != (facets, 4, 3) or given.dtype.kind not in "fiu":
         raise ValueError(f"{name}: numbers of shape ({facets}, 4, 3) are needed for the corners, or (n, 3) for the points, not {given.shape}")
+    if not np.isfinite(given).all():
+        facet, corner, axis = np.argwhere(~np.isfinite(given))[0].tolist()
+        raise ValueError(f"{name}[{facet}, {corner}, {axis}] is {given[facet, corner, axis]}: every normal must be finite; a zero one is the facet's own")
     return np.pad(given.reshape(-1, 3).astype(float), ((0, 0), (0, 2)))
 
 

@@ -136,6 +136,10 @@ def test_wrong_meshes_are_told_what_to_do() -> None:
         lp.Mesh.from_arrays(CUBE, [[0, 1, 8]])
     with pytest.raises(ValueError, match=r"positions\[1, 2\] is NaN"):
         lp.Mesh.from_arrays(np.array([[0, 0, 0], [0, 0, np.nan]]), np.array([[0, 1, 1]]))
+    normals = np.ones((6, 4, 3))
+    normals[2, 3, 1] = np.nan
+    with pytest.raises(ValueError, match=r"normals\[2, 3, 1\] is nan: every normal must be finite"):
+        lp.Mesh.from_arrays(CUBE, SIDES, normals)
     with pytest.raises(TypeError, match="takes a Mesh"):
         lp.Octree(CUBE)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="normals round"):
