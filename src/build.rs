@@ -1,5 +1,5 @@
-//! Notes the commit that a release build comes from, so that every report can name it, and what tells this build from others, so that only
-//! parts of runs that the same code traced are added up.
+//! Notes the commit that a release build comes from, so that every report can name it, and what distinguishes this build from others, so
+//! that only parts of runs that the same code traced are added up.
 
 use std::fs::DirEntry;
 use std::io::BufRead;
@@ -10,7 +10,7 @@ use std::process::Command;
 const SOURCES: [&str; 5] =
     ["src", "Cargo.toml", "Cargo.lock", "fixtures/step/lamp_multicavity.stp", "fixtures/scenes/demo.toml"];
 
-/// What stands for a commit that nothing tells.
+/// What stands for an unknown commit.
 const UNKNOWN: &str = "unknown";
 
 /// What stands behind a commit from which files differ.
@@ -20,7 +20,7 @@ const CHANGES: &str = "+changes";
 const MULTIPLIER: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Sets for the crate `LAMPYRIS_COMMIT`: that of the environment, of the package or of the repository, else [`UNKNOWN`]; and
-/// `LAMPYRIS_BUILD`: the commit, and behind it, or alone, a hash of the sources where no commit tells what they are.
+/// `LAMPYRIS_BUILD`: the commit, and behind it, or alone, a hash of the sources where no commit identifies them.
 fn main() {
     println!("cargo::rerun-if-changed=src/build.rs");
     println!("cargo::rerun-if-env-changed=LAMPYRIS_COMMIT");
@@ -28,7 +28,7 @@ fn main() {
     let release = std::env::var("PROFILE").is_ok_and(|p| p == "release");
     let given = std::env::var("LAMPYRIS_COMMIT").ok().filter(|commit| !commit.is_empty() && commit != UNKNOWN);
     let commit = given.or_else(packaged_commit).or_else(|| release.then(git_commit)?);
-    // A file that is changed and not committed is a change to tell, and a change of the crate anyway.
+    // A file that is changed and not committed is a change to note, and a change of the crate anyway.
     for path in SOURCES {
         println!("cargo::rerun-if-changed={path}");
     }
@@ -91,7 +91,7 @@ fn hash_with(hash: u64, bytes: &[u8]) -> u64 {
     mixed(hash, u64::from_le_bytes(last))
 }
 
-/// Returns a hash with a word added. No two words, and no two hashes before, give the same: another word alone always tells.
+/// Returns a hash with a word added. No two words, and no two hashes before, give the same: another word alone always changes it.
 fn mixed(hash: u64, word: u64) -> u64 {
     let product = (hash ^ word).wrapping_mul(MULTIPLIER);
     // Products carry upwards alone.

@@ -28,7 +28,7 @@ use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
-/// Runs the command with these arguments (the first is the program's name) and tells how it ended.
+/// Runs the command with these arguments (the first is the program's name) and returns how it ended.
 ///
 /// Exit codes: 0 done, 1 failed while running, 2 wrong arguments or scene, 3 input unreadable or not STEP, 4 done but more
 /// was refused or lost than `--max-refused` and `--max-lost` allow.

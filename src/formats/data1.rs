@@ -101,7 +101,7 @@ impl<'a> Lines<'a> {
 
     /// Checks that no line that is not blank is left, and refuses it by its number.
     pub(super) fn expect_end(&mut self) -> Result<(), Error> {
-        // More lines than promised mean that the count or the file is wrong; which, nobody can tell.
+        // More lines than promised mean that the count or the file is wrong; which, is unknown.
         match self.lines.next() {
             None => Ok(()),
             Some((n, _)) => Err(Error::at_line(self.path, n, "more lines than the number of rays says")),

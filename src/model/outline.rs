@@ -23,7 +23,7 @@ pub(super) struct Outline {
 }
 
 impl Outline {
-    /// Follows every loop by a polygon, fine enough to tell inside from outside but near the trims.
+    /// Follows every loop by a polygon, fine enough to separate inside from outside but near the trims.
     pub(super) fn new(face: &Face) -> Self {
         // A straight use is its two ends.
         let pieces = |span: &UseSpan<'_>| match span.curve.degree {

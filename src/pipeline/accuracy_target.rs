@@ -18,7 +18,7 @@ const RAY_LIFT_MM: f64 = 1.0;
 /// Where a ray starts that left a surface, as a share of its way to the next: in the middle, in free space whatever the facets. On its own
 /// line: lifted off the wall of a light guide by a tenth of that way it met the next wall less flat, and 0.42° were claimed for 0.51°.
 const STARTING_SHARE: f64 = 0.5;
-/// Rays that tell how many segments a path has.
+/// Rays that show how many segments a path has.
 const PROBED_RAYS: u64 = 64;
 /// Segments that are traced for each that is wanted, where paths are long: enough that those taken are of many paths.
 const SEGMENTS_A_WANTED_RAY: f64 = 16.0;
@@ -153,7 +153,7 @@ fn scene_rays(
     settings: &RunSettings,
     bound: &crate::simulate::BoundScene,
 ) -> Vec<Ray> {
-    // Some rays tell how long paths are: in an integrating sphere they have a thousand segments, and as many are wanted as of others.
+    // Some rays show how long paths are: in an integrating sphere they have a thousand segments, and as many are wanted as of others.
     let few = RunSettings { rays: settings.rays.min(PROBED_RAYS), ..settings.clone() };
     let segments = simulate(bound, traced_on, &few, &|_| true).segments.max(1);
     let enough = SEGMENTS_A_WANTED_RAY * settings.rays as f64 * few.rays as f64 / segments as f64;

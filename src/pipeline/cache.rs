@@ -24,7 +24,8 @@ use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-/// The program, by version and commit, and by its sources where no commit tells them: only what the same one made is kept and added up.
+/// The program, by version and commit, and by its sources where no commit identifies them: only what the same one made is kept and added
+/// up.
 pub const PROGRAM: &str = concat!(env!("CARGO_PKG_VERSION"), " ", env!("LAMPYRIS_BUILD"));
 /// First bytes of an entry.
 const MAGIC: &[u8] = b"lampyris cache 5\n";
@@ -84,7 +85,7 @@ impl Cache {
         self.fetch_or_turn(&choice_name(run), || self.choice(run, monitor))
     }
 
-    /// Keeps what was chosen for a later run, another shard or range among them; a failure is only told to the monitor.
+    /// Keeps what was chosen for a later run, another shard or range among them; a failure is only reported to the monitor.
     pub(super) fn keep_choice(&self, run: &Fingerprint, chosen: &TracingChoice, monitor: &dyn Monitor) {
         self.keep(&choice_name(run), monitor, |to| write_array(to, &chosen.to_words()));
     }
@@ -155,7 +156,7 @@ impl Cache {
             // Another process may just have removed it.
             let Ok(metadata) = entry.metadata() else { continue };
             if metadata.is_file() {
-                // A time that cannot be told counts as the oldest.
+                // A time that is not known counts as the oldest.
                 let used = metadata.modified().unwrap_or(SystemTime::UNIX_EPOCH);
                 files.push(CacheEntry { file: entry.path(), bytes: metadata.len(), used });
             }
@@ -164,7 +165,7 @@ impl Cache {
     }
 
     /// Reads an entry and marks it as just used; `None` where there is none, or one that is damaged or cannot be read, which is removed and
-    /// told to the monitor.
+    /// reported to the monitor.
     pub(super) fn fetch<T>(
         &self,
         name: &str,
@@ -189,7 +190,7 @@ impl Cache {
         }
     }
 
-    /// Writes an entry and removes what is too much; a failure is only told to the monitor.
+    /// Writes an entry and removes what is too much; a failure is only reported to the monitor.
     pub(super) fn keep(
         &self,
         name: &str,
@@ -254,7 +255,7 @@ impl CachedFacets<'_> {
         self.cache.fetch_or_turn(&self.name(FACETS), fetch)
     }
 
-    /// Keeps the facets for a later run; a failure is only told to the monitor.
+    /// Keeps the facets for a later run; a failure is only reported to the monitor.
     pub(super) fn keep_mesh(&self, mesh: &FacetMesh) {
         self.cache.keep(&self.name(FACETS), self.monitor, |to| mesh.write_arrays(to));
     }
@@ -284,7 +285,7 @@ fn choice_name(run: &Fingerprint) -> String {
 }
 
 /// Hashes all that decides facets and octree but the octree's settings, of which the arrays hold none that is not the program's default;
-/// the bytes of the models' files among it, as `reports` tells of them.
+/// the bytes of the models' files among it, as `reports` lists them.
 pub(super) fn facets_key(scene: &Scene, reports: &[ImportReport], mesher: &tessellate::Settings) -> Fingerprint {
     // Entries are raw bytes of numbers: machines of the other order must not share them.
     let machine = if cfg!(target_endian = "big") { "big" } else { "little" };

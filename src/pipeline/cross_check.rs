@@ -25,7 +25,7 @@ const FEWEST_RECHECKED: u64 = 2000;
 /// The fewest rays whose segments these are: 2000 paths are as many places, directions and depths, however long each is.
 const FEWEST_REPLAYED: u64 = 2000;
 
-/// Rays traced on facets and on the spline: some 16,000 tell widths within a few per cent.
+/// Rays traced on facets and on the spline: some 16,000 give widths within a few per cent.
 const FACETING_RAYS: f64 = 16_384.0;
 /// The fewest of these, however long they are.
 const FEWEST_FACETING_RAYS: f64 = 1000.0;
@@ -174,7 +174,7 @@ fn facet_effects(
         return None;
     }
     let segments_a_ray = results.segments as f64 / results.rays.max(1) as f64;
-    // Long paths cost more a ray: fewer of them tell as much in the same time.
+    // Long paths cost more a ray: fewer of them show as much in the same time.
     let rays = (FACETING_SEGMENTS / segments_a_ray.max(1.0)).clamp(FEWEST_FACETING_RAYS, FACETING_RAYS) as u64;
     let run = prepared.run_settings();
     // In replicates of their own, however the run itself is divided.

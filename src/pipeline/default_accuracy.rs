@@ -71,7 +71,7 @@ impl PilotSource for ModelPilotSource<'_> {
         };
         let choice = IntersectorChoice { intersector: IntersectorKind::Octree, normals: NormalMode::Exact };
         let groups = (&meshes[..], facets.instancing.as_deref());
-        // A part of choosing, of which alone the monitor is told.
+        // A part of choosing, of which alone the monitor is notified.
         with_built_intersector(choice, builders, groups, &Silent, |moved, _| work(moved));
     }
 

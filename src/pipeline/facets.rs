@@ -106,7 +106,7 @@ fn scope_of_face(name: &str, model: &Model) -> Result<ToleranceScope, Error> {
     })))
 }
 
-/// Makes the facets of a model in one piece, tells the monitor, and returns them with the seconds they took.
+/// Makes the facets of a model in one piece, notifies the monitor, and returns them with the seconds they took.
 pub fn tessellate_model(
     model: &Model,
     settings: &tessellate::Settings,
@@ -117,7 +117,7 @@ pub fn tessellate_model(
     (tessellation, start.elapsed().as_secs_f64())
 }
 
-/// Makes the facets of a model, those of parts that are placed often once and in their own coordinates, and tells the monitor.
+/// Makes the facets of a model, those of parts that are placed often once and in their own coordinates, and notifies the monitor.
 pub fn tessellate_by_part(model: &Model, settings: &tessellate::Settings, monitor: &dyn Monitor) -> GroupedFacets {
     let instancing = Instancing::new(model, settings.glue_mm).map(Arc::new);
     in_stage(monitor, Stage::Tessellating, || tessellate_groups(model, instancing.as_ref(), settings).0)

@@ -1,4 +1,4 @@
-//! What a job tells while it runs.
+//! What a job reports while it runs.
 
 use super::settings::IntersectorKind;
 use crate::study;
@@ -15,7 +15,7 @@ pub enum Stage<'a> {
     Tessellating,
     /// A pilot chooses between facets and spline.
     Choosing,
-    /// Facets that keep an accuracy are looked for; [`Monitor::study_progress`] tells how far.
+    /// Facets that keep an accuracy are looked for; [`Monitor::study_progress`] says how far.
     Aiming,
     /// An intersector is built.
     Building(IntersectorKind),
@@ -65,7 +65,7 @@ pub struct Silent;
 
 impl Monitor for Silent {}
 
-/// Does a piece of work, with the monitor told when it begins and ends.
+/// Does a piece of work, with the monitor notified when it begins and ends.
 pub(super) fn in_stage<T>(monitor: &dyn Monitor, stage: Stage<'_>, work: impl FnOnce() -> T) -> T {
     monitor.begin(stage);
     let made = work();

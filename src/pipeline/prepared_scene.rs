@@ -122,7 +122,7 @@ impl PreparedScene {
             surfaces: OnceLock::new(),
             few_ray_surfaces: OnceLock::new(),
         };
-        // A run that is told anything of how it is traced has no choice made for it.
+        // A run whose tracing is specified at all has no choice made for it.
         let is_open = !is_accuracy_asked(&prepared.job.meshing, &prepared.job.tracing, &prepared.job.scene);
         let known = if is_open { prepared.known_choice(monitor) } else { None };
         if let Some(chosen) = known {
@@ -216,7 +216,7 @@ impl PreparedScene {
         (mesher, default_accuracy::intersector_choice(chosen))
     }
 
-    /// Takes tolerance, normals and intersector of a choice and tells the monitor. The facets are left as they are: the caller makes
+    /// Takes tolerance, normals and intersector of a choice and notifies the monitor. The facets are left as they are: the caller makes
     /// those of the choice.
     fn take_choice(&mut self, chosen: TracingChoice, monitor: &dyn Monitor) {
         monitor.chosen(&chosen);

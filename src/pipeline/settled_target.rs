@@ -39,7 +39,7 @@ pub fn trace_until_settled(
 /// which no rays settle. A row at its very limit asks for no number: then twice as many are tried.
 fn rays_wanted(prepared: &PreparedScene, results: &Results) -> Vec<u64> {
     let all = prepared.job.scene.regulations.iter();
-    // One that cannot be judged asks for no rays; the last run tells why.
+    // One that cannot be judged asks for no rays; the last run says why.
     let verdicts = all.filter_map(|wanted| verdict(wanted, prepared, results, |_| None).ok());
     let is_unsure = |row: &RowVerdict| row.verdict == Some(Verdict::Unsure) && row.unseen == 0;
     let rays = |row: &RowVerdict| row.settles.map_or(results.rays.saturating_mul(2), |s| s.rays);

@@ -32,7 +32,7 @@ const LEAST_ELBOW_GRADIENT: f64 = 0.08;
 const SCAN_V_DEG: f64 = 3.0;
 
 /// Half the width of the opening of the vertical scan, degrees: the cut-off is level within 0.2° from 1.5° to 3.5° left (there, §2.2.3),
-/// and more of it tells its height with less noise.
+/// and more of it gives its height with less noise.
 const LEVEL_HALF_DEG: f64 = 0.5;
 
 /// V of the horizontal scan, degrees (there, §2.3.2, a).

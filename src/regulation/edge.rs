@@ -15,7 +15,7 @@ const STEPS_OF_GRADIENT: usize = (GRADIENT_DEG / STEP_DEG).round() as usize;
 /// Half the opening that scans are made with, degrees: a detector of 30 mm at 25 m, however wide the cells are.
 pub(super) const SCAN_HALF_DEG: f64 = 0.0344;
 
-/// Light that a photometer cannot tell from darkness, as a share of the brightest on the scan: without it the gradient would be
+/// Light that a photometer cannot distinguish from darkness, as a share of the brightest on the scan: without it the gradient would be
 /// steepest where the last ray of a simulation fell, not at the edge of the light.
 const DARK_SHARE: f64 = 0.01;
 
@@ -69,7 +69,7 @@ impl Edge {
 }
 
 /// Returns how far, across it, an edge of this gradient may lie from where cells of this width let it be seen, at [`SIGMAS`], degrees.
-/// Light of such a gradient falls by 10^(G · width / 0.1°) over a cell, and the cells do not tell where within: half the square of that
+/// Light of such a gradient falls by 10^(G · width / 0.1°) over a cell, and the cells do not show where within: half the square of that
 /// exponent, in widths, was not passed by beams of closed form in cells of 0.025° to 0.149°.
 pub(super) fn blur_by_cells(gradient: f64, cell_deg: f64) -> f64 {
     let decades = gradient * cell_deg / GRADIENT_DEG;

@@ -1,4 +1,4 @@
-//! What few rays leave open of a reading: the spread of replicates tells nothing of rays that did not come.
+//! What few rays leave open of a reading: the spread of replicates says nothing of rays that did not come.
 //!
 //! Rays that land in an opening are counts. If each adds `a` candela and they are `m`, the truth may lie as far above as the upper limit of
 //! a Poisson count of `m`, times `a`: 6.6 rays at three standard errors where none came, by root and skewness where many did. Rays of
@@ -68,7 +68,7 @@ pub(super) struct LandingRay {
 pub(super) struct Noise {
     /// What the heaviest ray that may land adds to the reading, cd; 0 where the truth lies towards fewer rays, or nothing is known of them.
     pub(super) ray_cd: f64,
-    /// What heavier rays may add on the mean, cd, so few that they are not told from the others.
+    /// What heavier rays may add on the mean, cd, so few that they are not distinguished from the others.
     pub(super) hidden: f64,
     /// What one of these adds, cd.
     pub(super) hidden_ray_cd: f64,

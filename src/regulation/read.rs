@@ -82,7 +82,7 @@ impl IntensityMap {
     /// [`Self::of_spline`]. Of several columns in cd `luminous_intensity_cd` is read, or else `Y_cd`.
     ///
     /// Angles are taken for those of type A, as regulations have them. Those of a receiver with `angles = "B"` stand under the same names:
-    /// the file does not tell them apart.
+    /// the file does not distinguish them.
     ///
     /// `rays` are those of the run, where they are known: what few of them leave open.
     ///

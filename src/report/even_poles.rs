@@ -7,7 +7,7 @@ use crate::simulate::scene::FarFieldType;
 use std::borrow::Cow;
 use std::iter::once;
 
-/// Returns the rings of cells at and beside the poles of a grid over planes C; none for any other, whose axes do not tell their poles.
+/// Returns the rings of cells at and beside the poles of a grid over planes C; none for any other, whose axes do not show their poles.
 pub(super) fn plane_rings(grid: &Grid) -> PoleRings {
     let [c, gamma] = &grid.axes;
     if c.label != "C" {

@@ -16,7 +16,7 @@ pub(super) fn framed_map(counted: &Counted<'_>) -> Chart {
     let Counted { receiver: r, figures, grid } = *counted;
     let title = format!("{}: {} ({})", r.name, grid.quantity, grid.unit);
     let stem = file_stem(&r.name);
-    // Candela and lux beside watts: the unit tells the files apart.
+    // Candela and lux beside watts: the unit distinguishes the files.
     let name = if grid.unit == unit_in_words(r.unit) { stem } else { format!("{stem}-{}", grid.unit) };
     let mut caption = reading(r, grid, figures.max.as_ref());
     let part = lit_part(grid);

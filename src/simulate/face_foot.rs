@@ -26,7 +26,7 @@ const PIECES: usize = 128;
 /// Share of its distance that a rounded box may lie too far away.
 pub(crate) const BOX_ROUNDING: f64 = 1e-9;
 
-/// Boxes around the pieces of a surface: they tell at once of most points, also of those within a reflector, that they are far from it.
+/// Boxes around the pieces of a surface: they show at once for most points, also of those within a reflector, that they are far from it.
 ///
 /// As a tree: asked one by one, the boxes of a reflector around a luminous chip took six times as long as all else of its rays.
 #[derive(Clone, Debug)]
@@ -109,7 +109,7 @@ impl FaceSamples {
 }
 
 /// Goes from a point of the face towards the foot of the perpendicular from `p` by Gauss–Newton; returns the nearest point inside the
-/// trims, as `is_inside` tells, that it came by, or the one it began with.
+/// trims, by `is_inside`, that it came by, or the one it began with.
 pub(crate) fn foot_from(
     face: &Face,
     is_inside: impl Fn(Uv) -> bool,
@@ -151,7 +151,7 @@ mod tests {
     use crate::nurbs::sweep;
     use std::f64::consts::{FRAC_PI_2, TAU};
 
-    /// A point is near a sphere of radius 5 as far as its distance from the middle tells; boxes may say that one is near that is not.
+    /// A point is near a sphere of radius 5 as far as its distance from the middle shows; boxes may say that one is near that is not.
     #[test]
     fn boxes_hold_all_that_is_near() {
         let boxes = PieceBoxes::new(&sweep::sphere(&Frame::IDENTITY, 5.0, [0.0, TAU], [-FRAC_PI_2, FRAC_PI_2]));

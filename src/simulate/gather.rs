@@ -14,7 +14,7 @@ use std::time::Instant;
 /// Cells of all receivers, faces and bodies up to which each thread has sums of its own: 32 MB.
 const MOST_THREAD_CELLS: usize = 1 << 20;
 
-/// The total of what all threads have handed over, behind a lock, and the hooks that are told of it.
+/// The total of what all threads have handed over, behind a lock, and the hooks that are notified of it.
 pub(super) struct Gathering<'a> {
     total: Mutex<(PartialRun, Cost)>,
     hooks: &'a Hooks<'a>,

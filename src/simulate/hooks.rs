@@ -1,4 +1,4 @@
-//! What a run tells while it runs, and what it hands back.
+//! What a run reports while it runs, and what it hands back.
 
 use super::outcome::PathSink;
 use super::partial_run::PartialRun;
@@ -20,7 +20,7 @@ pub struct Progress {
 /// Takes the number and the tally of a replicate, from any thread.
 pub type ReplicateHook<'a> = &'a (dyn Fn(u32, &ReplicateTally) + Sync);
 
-/// What a run tells while it runs.
+/// What a run reports while it runs.
 #[derive(Clone, Copy)]
 pub struct Hooks<'a> {
     /// Called from the worker threads after each replicate; it ends the run early by returning `false`.
@@ -37,7 +37,7 @@ pub struct Hooks<'a> {
 }
 
 impl<'a> Hooks<'a> {
-    /// Makes hooks that tell progress alone.
+    /// Makes hooks that report progress alone.
     pub fn with_progress(progress: &'a (dyn Fn(Progress) -> bool + Sync)) -> Self {
         Self { progress, finished: None, every: Duration::ZERO, replicate: None, paths: None }
     }

@@ -15,7 +15,7 @@ use crate::math::{Point, Ray, Vector, run_on_threads};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Most rays of all lists together whose ends are told: they take half a gigabyte.
+/// Most rays of all lists together whose ends are reported: they take half a gigabyte.
 pub const MOST_LISTED_RAYS: u64 = 5_000_000;
 
 /// Rays that a thread takes at a time.

@@ -242,7 +242,7 @@ impl Plan {
 
     /// Returns the source and the replicate of a ray, by its number; `None` when the run has no such ray.
     pub(crate) fn locate(&self, ray: u64) -> Option<(usize, u32)> {
-        // Ranges of sources and replicates follow each other, so that a ray's number tells both.
+        // Ranges of sources and replicates follow each other, so that a ray's number gives both.
         if let Some(size) = self.replicate_rays {
             let replicate = u32::try_from(ray / size).ok().filter(|r| *r < self.replicates)?;
             return Some((self.source_of(ray % size)?, replicate));

@@ -36,7 +36,7 @@ impl PowerScale {
     }
 
     /// Returns how many of `total` quanta, above 0, may be rounding, where replicates differ by `spread`. Rays that a dense filter leaves a
-    /// few quanta each are rounded alike, which no spread tells.
+    /// few quanta each are rounded alike, which no spread shows.
     fn rounding(&self, total: f64, spread: f64) -> f64 {
         // The cut of their squares hides a spread of up to that of as many replicates that have light next to none without.
         let of_squares = f64::from(self.replicates.max(2)).sqrt() * SQUARELESS;

@@ -280,7 +280,7 @@ impl ReceiverResult {
 
     /// Returns the rings of cells at and beside the poles, as far as the map reaches them; none of receivers without angles.
     pub(crate) fn pole_rings(&self) -> PoleRings {
-        // A sphere is told by angles of type A.
+        // A sphere is described by angles of type A.
         let angles = if self.kind == "sphere" { Some(FarFieldType::A) } else { self.angles };
         let Some(angles) = angles else { return PoleRings::default() };
         PoleRings::new(angles, self.grid, [self.bounds(0), self.bounds(1)])
@@ -334,7 +334,7 @@ pub(super) fn unseen_light_notes(receivers: &[ReceiverResult]) -> Vec<String> {
     })
 }
 
-/// Number of rays from which on their own spread tells how well a mean place is known.
+/// Number of rays from which on their own spread says how well a mean place is known.
 const TELLING_RAYS: f64 = 64.0;
 /// Mean square and mean fourth power of the coordinate of a ray that may fall anywhere, in half sides: those of an even distribution.
 const ANYWHERE: [f64; 2] = [1.0 / 3.0, 1.0 / 5.0];
@@ -357,7 +357,7 @@ fn mean_and_rms_errors([_, square]: [f64; 2], [of_mean, of_square]: [f64; 2]) ->
     [of_mean, 0.5 * of_square / square.sqrt().max(f64::MIN_POSITIVE)]
 }
 
-/// Adds to the standard errors of mean place and root mean square, in half sides, what few rays cannot tell: one has no spread at all, and
+/// Adds to the standard errors of mean place and root mean square, in half sides, what few rays cannot show: one has no spread at all, and
 /// the spread of two or three is often far too small by chance.
 ///
 /// The mean that deviations are taken from is that of the same rays, which makes their squares smaller by (n − 1)/n. Beside that, one ray

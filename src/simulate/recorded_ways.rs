@@ -20,7 +20,7 @@ pub struct RecordedWay {
     pub points: Vec<Point>,
 }
 
-/// Returns the recorded paths whose light a receiver counted, each once for each time that it did, by as many steps as the results tell
+/// Returns the recorded paths whose light a receiver counted, each once for each time that it did, by as many steps as the results state
 /// apart. `settings` are those of the run. Empty for a number without a receiver, and for results without recorded paths.
 pub fn recorded_ways(
     bound: &BoundScene,

@@ -19,7 +19,7 @@ use super::tally::Sum;
 use crate::intersect::Cost;
 use serde::Serialize;
 
-/// Rates are told in millions.
+/// Rates are given in millions.
 const MILLION: f64 = 1e6;
 
 /// Results of a simulation.
@@ -161,7 +161,7 @@ impl Results {
         // A run that was stopped early, or is one shard of many, answers for the rays it traced.
         let traced = tallies.ends[0].total as f64 * plan.quantum;
         let quantum = if traced > 0.0 && plan.grows() {
-            // From the sums alone, so that it does not matter which of its parts told how large the run is.
+            // From the sums alone, so that it does not matter which of its parts stated how large the run is.
             plan.emitted / tallies.ends[0].total as f64
         } else if traced > 0.0 {
             plan.quantum * plan.emitted / traced

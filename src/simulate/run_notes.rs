@@ -7,27 +7,27 @@ use super::receiver::{NAMED_RECEIVERS, Receiver, Shape};
 use super::tally::Sum;
 use crate::text::{count_of, figures, first_sentences, grouped};
 
-/// Segments to one meeting of an overlap from which on it is told. Beside edges where bodies touch rounding may pass for an overlap: in
+/// Segments to one meeting of an overlap from which on it is reported. Beside edges where bodies touch rounding may pass for an overlap: in
 /// one scene once in 10^6 segments.
 const OVERLAP_SEGMENTS: u64 = 10_000;
-/// Rays of a source to one that starts in a face and shines into it, from which on that is told: fewer are those that chance puts within
-/// the glue distance of a face that a source stands across.
+/// Rays of a source to one that starts in a face and shines into it, from which on that is reported: fewer are those that chance puts
+/// within the glue distance of a face that a source stands across.
 const FLUSH_RAYS: u64 = 10_000;
 /// Rays of a source below which next to nothing is known of its light.
 const SCARCE_RAYS: u64 = 64;
-/// Power of a ray over that of the mean one above which it is told that a source has few of them.
+/// Power of a ray over that of the mean one above which it is reported that a source has few of them.
 const HEAVY: f64 = 10.0;
 /// Chance that all rays of a source miss a place, below which it is neglected: errors are to hold in 95 % of runs.
 const UNLIKELY: f64 = 0.05;
 /// Draws of each ray of a list, were all of equal power, from which on its own scatter is more than theirs.
 const DRAWN_OFTEN: f64 = 2.0;
-/// Share of a list's light that arrives where what the list leaves open is greatest, for which it is told.
+/// Share of a list's light that arrives where what the list leaves open is greatest, for which it is reported.
 const MOST_OPEN_SHARE: f64 = 0.5;
-/// Share of a list's rays below which it is told how many of equal power leave as little open.
+/// Share of a list's rays below which it is reported how many of equal power leave as little open.
 const UNEVEN: f64 = 0.9;
-/// Share of a source's power from which on what rounding changes of it is told.
+/// Share of a source's power from which on what rounding changes of it is reported.
 const ROUNDED: f64 = 1e-5;
-/// Share of the mean power of a source below which it is told: among thousands alike each has few rays, and all together enough.
+/// Share of the mean power of a source below which it is reported: among thousands alike each has few rays, and all together enough.
 const WEAK: f64 = 0.1;
 
 impl BoundScene {
@@ -110,9 +110,9 @@ impl BoundScene {
         ))
     }
 
-    /// Returns one sentence about sources whose `rays` are so few beside their power that the spread of replicates may tell too small or
+    /// Returns one sentence about sources whose `rays` are so few beside their power that the spread of replicates may give too small or
     /// too large an error of their light, and by how much; `None` where there are none. Rays count in the replicates that are `done`: where
-    /// none is, as in a replay, no error is told.
+    /// none is, as in a replay, no error is reported.
     pub(crate) fn heavy_rays_note(&self, plan: &Plan, done: &[u32]) -> Option<String> {
         if done.is_empty() {
             return None;
@@ -229,7 +229,7 @@ impl BoundScene {
     }
 }
 
-/// Returns the error that the spread of so many replicates tells of the power of so few rays, as a share of it, though all of them arrive:
+/// Returns the error that the spread of so many replicates gives for the power of so few rays, as a share of it, though all of them arrive:
 /// one replicate has a ray, another none. `None` where each has one, and where none has.
 fn replicate_scatter(rays: u64, replicates: usize) -> Option<f64> {
     let (rays, replicates) = (rays as f64, replicates as f64);

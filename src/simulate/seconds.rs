@@ -27,10 +27,10 @@ pub struct MergedSeconds {
     pub parts: u32,
     /// Machines that traced them, by name.
     pub machines: u32,
-    /// Seconds of all threads of all parts; `null` where a system did not tell.
+    /// Seconds of all threads of all parts; `null` where a system did not report it.
     pub cpu: Option<f64>,
     /// Seconds of the slowest part.
     pub slowest: f64,
-    /// Threads of the part that had most; `null` where none tells.
+    /// Threads of the part that had most; `null` where none records it.
     pub threads: Option<u32>,
 }

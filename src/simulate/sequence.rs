@@ -7,7 +7,7 @@ use super::receiver::Shape;
 use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
 
-/// Most steps of a sequence that are told apart; fewer in runs of very many sequences, see [`SequenceSums`](super::SequenceSums). Light
+/// Most steps of a sequence that are distinguished; fewer in runs of very many sequences, see [`SequenceSums`](super::SequenceSums). Light
 /// that went on, caught in a guide or a cavity, is in the sequence of its first steps: without a limit nearly every path of such a scene
 /// would be a sequence of its own.
 pub const MOST_STEPS: usize = 32;
@@ -30,7 +30,7 @@ pub struct Sequence {
     pub source: u32,
     /// What happened in between.
     pub steps: Vec<SequenceStep>,
-    /// Whether more steps followed than are told apart.
+    /// Whether more steps followed than are distinguished.
     pub more: bool,
 }
 
@@ -46,7 +46,7 @@ impl Sequence {
         Self::new(receiver, source, steps)
     }
 
-    /// Returns the sequence of so many first steps that it belongs to where no more are told apart.
+    /// Returns the sequence of so many first steps that it belongs to where no more are distinguished.
     pub(super) fn cut(mut self, limit: usize) -> Self {
         if self.steps.len() > limit {
             self.steps.truncate(limit);
@@ -88,8 +88,8 @@ impl<'v> RayPaths<'v> {
         Self(by_branch)
     }
 
-    /// Returns what happened to the light of a branch before its hit of this number, from the source on, as far as it is told apart and one
-    /// step more; empty for a branch without vertices.
+    /// Returns what happened to the light of a branch before its hit of this number, from the source on, as far as steps are distinguished
+    /// and one step more; empty for a branch without vertices.
     pub(super) fn steps(&self, branch: u32, bounce: u32) -> Vec<SequenceStep> {
         let Some(vertices) = self.0.get(&branch) else { return Vec::new() };
         let mut steps = match vertices.first() {

@@ -22,7 +22,7 @@ pub struct SequenceResult {
     pub source_name: String,
     /// What happened on the way.
     pub steps: Vec<SequenceStep>,
-    /// Whether more steps followed than are told apart.
+    /// Whether more steps followed than are distinguished.
     pub more: bool,
 }
 
@@ -58,7 +58,7 @@ impl ReceiverSequences {
     }
 }
 
-/// Returns a sentence about sequences of which fewer steps than usual are told apart; `None` where it is as many.
+/// Returns a sentence about sequences of which fewer steps than usual are distinguished; `None` where it is as many.
 pub(super) fn cut_sequences_note(sums: &SequenceSums) -> Option<String> {
     let by = match sums.limit() {
         MOST_STEPS => return None,

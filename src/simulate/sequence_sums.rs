@@ -1,6 +1,6 @@
 //! Power by sequence, of a bounded number of sequences.
 //!
-//! Where light is scattered in a cavity nearly every ray takes a way of its own. Then fewer steps are told apart: of 32, 16, 8, 4, 2, 1
+//! Where light is scattered in a cavity nearly every ray takes a way of its own. Then fewer steps are distinguished: of 32, 16, 8, 4, 2, 1
 //! and 0 the most at which the run has at most [`MOST_SEQUENCES`] sequences.
 //!
 //! Which that is hangs on the rays of the run alone, and not on how it is divided. Sequences that are the same stay the same when both
@@ -14,13 +14,13 @@ use super::sequence::{MOST_STEPS, Sequence};
 use super::tally::Sum;
 use std::collections::BTreeMap;
 
-/// Most sequences that are told apart: with all that they may be cut to they take some 40 MB.
+/// Most sequences that are distinguished: with all that they may be cut to they take some 40 MB.
 const MOST_SEQUENCES: usize = 1 << 15;
 
 /// Power by sequence, quanta of one replicate.
 #[derive(Debug)]
 pub(crate) struct SequenceTally {
-    /// Steps of a sequence that are told apart.
+    /// Steps of a sequence that are distinguished.
     limit: usize,
     quanta: BTreeMap<Sequence, u128>,
 }
@@ -54,7 +54,7 @@ fn cut_all(sequences: impl IntoIterator<Item = (Sequence, u128)>, limit: usize) 
 /// Power by sequence over replicates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SequenceSums {
-    /// Steps of a sequence that are told apart.
+    /// Steps of a sequence that are distinguished.
     limit: usize,
     /// Those of at most as many steps, and what longer ones are cut to at lower limits.
     sums: BTreeMap<Sequence, Sum>,
@@ -67,7 +67,7 @@ impl Default for SequenceSums {
 }
 
 impl SequenceSums {
-    /// Returns how many steps of a sequence are told apart: [`MOST_STEPS`], or fewer where there would be too many sequences.
+    /// Returns how many steps of a sequence are distinguished: [`MOST_STEPS`], or fewer where there would be too many sequences.
     pub fn limit(&self) -> usize {
         self.limit
     }
@@ -120,7 +120,7 @@ impl SequenceSums {
 
     /// Lowers the limit until there are few enough sequences.
     fn make_room(&mut self) {
-        // No more than are held are told, so that they are seldom counted.
+        // No more than are held are listed, so that they are seldom counted.
         while self.limit > 0 && self.sums.len() > MOST_SEQUENCES && self.iter().count() > MOST_SEQUENCES {
             self.lower_limit(self.limit / 2);
         }
@@ -158,7 +158,7 @@ mod tests {
     const REPLICATES: u32 = 8;
     const RAYS: u32 = 8192;
 
-    /// The way of a ray that meets of eight faces those of its octal digits, six steps that tell all rays apart, then `further` ones.
+    /// The way of a ray that meets of eight faces those of its octal digits, six steps that distinguish all rays, then `further` ones.
     fn way(ray: u32, further: usize) -> Sequence {
         let faces = (0..6).map(|k| ray / FACES.pow(k) % FACES).chain(std::iter::repeat_n(0, further));
         let steps = faces.map(|face| SequenceStep { face: Some(face), event: Event::Reflected });

@@ -78,7 +78,7 @@ pub enum KernelChoice {
     Full,
 }
 
-/// Returns the threads that this machine has; one where it does not tell.
+/// Returns the threads that this machine has; one where it does not report them.
 pub(crate) fn machine_threads() -> usize {
     std::thread::available_parallelism().map_or(1, |n| n.get())
 }

@@ -9,7 +9,7 @@ pub(crate) struct FaceOptics {
     pub(crate) surface: u16,
     /// The body whose boundary it is; [`AMBIENT`](super::body::AMBIENT) when there is no medium behind it.
     pub(crate) body: u32,
-    /// Number of its solid in its part, by which solids of one body are told apart.
+    /// Number of its solid in its part, by which solids of one body are distinguished.
     pub(crate) solid: u32,
     /// Whether it bounds a closed solid that lets no light in.
     pub(crate) opaque_solid: bool,

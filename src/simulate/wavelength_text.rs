@@ -10,7 +10,7 @@ pub(super) fn wavelength_text(nm: f64) -> String {
     format!("{} nm", figures(nm, WAVELENGTH_DIGITS))
 }
 
-/// Writes the wavelengths from the first to the second, nm, with their unit; one alone where no digit tells them apart.
+/// Writes the wavelengths from the first to the second, nm, with their unit; one alone where no digit distinguishes them.
 pub(super) fn wavelength_range_text([first, last]: [f64; 2]) -> String {
     let [from, to] = [first, last].map(|nm| figures(nm, WAVELENGTH_DIGITS));
     if from == to { format!("{from} nm") } else { format!("{from} to {to} nm") }

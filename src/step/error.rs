@@ -41,7 +41,7 @@ pub enum ErrorKind {
     TooManyPlaced {
         /// Name of the file.
         file: String,
-        /// How many, as far as a 64-bit number tells.
+        /// How many, as far as a 64-bit number can hold.
         count: u64,
         /// Most that are placed.
         limit: u64,

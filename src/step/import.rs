@@ -49,7 +49,7 @@ pub(crate) fn read_file(path: &Path) -> Result<(String, Vec<u8>), Error> {
     Ok((formats::file_name(path), bytes))
 }
 
-/// A hash that tells files apart, the same on every machine.
+/// A hash that distinguishes files, the same on every machine.
 pub(super) fn hash_bytes(bytes: &[u8]) -> u64 {
     let mut hasher = FxHasher::default();
     hasher.write(bytes);
@@ -381,7 +381,7 @@ impl Reader<'_, '_, '_> {
     }
 }
 
-/// Returns the largest resident size of this process so far, bytes; `None` where the system does not tell.
+/// Returns the largest resident size of this process so far, bytes; `None` where the system does not report it.
 pub(crate) fn peak_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;

@@ -46,12 +46,12 @@ pub struct ImportReport {
     pub gap_max_mm: f64,
     /// Statements and placements that could not be read, with their lines or instances.
     pub problems: Vec<String>,
-    /// Whether the file was cut off: shapes may be missing of which nothing tells.
+    /// Whether the file was cut off: shapes may be missing without a trace.
     #[serde(default)]
     pub cut_off: bool,
     /// Time taken.
     pub seconds: Seconds,
-    /// Largest resident size of the process so far, bytes; `None` where the system does not tell.
+    /// Largest resident size of the process so far, bytes; `None` where the system does not report it.
     pub peak_bytes: Option<u64>,
 }
 

@@ -76,7 +76,7 @@ pub fn arbitrate(mesh: &FacetMesh, ray: &Ray, first: Option<&Hit>, second: Optio
                 && nearest.is_none_or(|n| hit.t <= n || same_distance(n, hit.t))
         }
     };
-    // Two right answers may differ at a silhouette; two wrong ones tell nothing of either.
+    // Two right answers may differ at a silhouette; two wrong ones say nothing of either.
     match (holds(first), holds(second)) {
         (true, false) => Arbitration::First,
         (false, true) => Arbitration::Second,
@@ -103,7 +103,7 @@ fn passes_near(ray: &Ray, corners: &[Point; 4]) -> bool {
     aside.length() <= reach * (1.0 + CULL_RELATIVE) + CULL_ROUNDING * (1.0 + from_corner.length())
 }
 
-/// A triangle that the ray meets as far as rounding can tell.
+/// A triangle that the ray meets as far as rounding can show.
 struct Crossing {
     /// Distance, mm.
     t: f64,

@@ -8,7 +8,7 @@
 //!
 //! Guarantee: the choice follows from model, scene, seed, number of rays and counted work, never from a clock, so that every
 //! machine, number of threads and shard makes the same one, and so does every range of a run that grows.
-//! Known weakness: errors that the pilot is too short to tell from none count as large, so that the spline is taken where facets
+//! Known weakness: errors that the pilot is too short to distinguish from none count as large, so that the spline is taken where facets
 //! might have done.
 
 use super::geometric_error::{GeometricError, MOST_CELLS, ReplicatedRun, compare, trace_replicates};
@@ -24,14 +24,14 @@ use std::time::Instant;
 
 /// The pilot traces one ray in so many.
 const SHARE: u64 = 32;
-/// Least and most rays of a pilot: fewer tell nothing of a map, more would only show what is far below what people look at.
+/// Least and most rays of a pilot: fewer say nothing of a map, more would only show what is far below what people look at.
 const PILOT_RAYS: [u64; 2] = [4096, 65_536];
 /// Runs of at most so many rays take the spline at once: a pilot would cost much of what facets could save.
 const SHORT_RUN: u64 = 32_768;
 /// A run that grows is judged as of so many rays, whichever of them are asked for: all its ranges take the same settings, so that they
 /// merge, and what it took holds until it has grown so far.
 const GROWN_RAYS: u64 = 100_000_000;
-/// Replicates of a pilot, which tell the standard error of a difference within 9 %.
+/// Replicates of a pilot, which give the standard error of a difference within 9 %.
 const REPLICATES: u32 = 64;
 /// Share of the light that the spline may lose beyond what facets do before facets are taken all the same.
 const LOST: f64 = 1e-3;
@@ -312,7 +312,7 @@ impl UndecidedRun<'_> {
         if self.run.grows { GROWN_RAYS } else { self.run.rays }
     }
 
-    /// Writes for how many rays the run is judged: those of the errors that a reason tells, which may be more than were traced in the end.
+    /// Writes for how many rays the run is judged: those of the errors that a reason states, which may be more than were traced in the end.
     fn judged_note(&self) -> String {
         if self.run.grows {
             return "; a run that grows is judged as one of 10⁸ rays".into();

@@ -1,6 +1,6 @@
 //! The figures that a run prints for each receiver, each with both its errors.
 //!
-//! Where no ray arrived the spread of the rays tells nothing, and is no error of 0: what one ray adds is stated instead. Three times that
+//! Where no ray arrived the spread of the rays says nothing, and is no error of 0: what one ray adds is stated instead. Three times that
 //! is the limit of 95 % of what may be there (the rule of three: of n rays none arrives with probability e⁻³ where 3/n of them should).
 
 use super::geometric_error::{GeometricError, Paired, ReceiverError};
@@ -343,7 +343,7 @@ impl<'a> Errors<'a> {
         value / rays.max(1.0)
     }
 
-    /// Makes the figures of a receiver's channels; `unit` is that of powers, which bins are told in.
+    /// Makes the figures of a receiver's channels; `unit` is that of powers, which bins are given in.
     fn channels(&self, r: &ReceiverResult, unit: &str) -> Vec<ChannelFigure> {
         let of_channel = |(k, c): (usize, &ChannelResult)| {
             let of_facets = |m: &ReceiverError| m.channels.get(k).map_or(0.0, |c| c.total.geometric());

@@ -49,7 +49,7 @@ pub(super) fn ways_before_spline(excess: f64, facets: usize, hits: f64) -> Vec<W
     let factor = MARGIN * excess;
     // The number of facets goes with the inverse of the tolerance.
     let finer = factor * facets as f64 * FACET + hits * FACET_HIT * longer_on(factor);
-    // Of moved hits only a trial tells about how many the spline must be asked.
+    // Of moved hits only a trial shows about how many the spline must be asked.
     let mut ways = vec![(Way::Moved, hits * MOVED_HIT)];
     if factor <= MOST_FINER {
         ways.push((Way::Finer(factor), finer));

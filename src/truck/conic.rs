@@ -12,7 +12,7 @@ pub struct ShapeError {
     pub(super) allowed: &'static str,
 }
 
-/// Returns the value where it is finite and `good`, else an error that tells what is allowed.
+/// Returns the value where it is finite and `good`, else an error that says what is allowed.
 pub(super) fn check_value(
     what: &'static str,
     value: f64,

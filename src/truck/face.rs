@@ -104,7 +104,7 @@ fn plane_parts(p: &Plane, wires: &[Vec<WireEdge>]) -> Result<Parts, String> {
     Ok((surface, Analytic::Plane { frame }, false, loops, gap))
 }
 
-/// Returns a spline with its trims, which are traced on it; `middles` are u in the middle of each edge, which tell on which side of a seam
+/// Returns a spline with its trims, which are traced on it; `middles` are u in the middle of each edge, which show on which side of a seam
 /// it runs. Edges without length are left out: they are poles.
 fn spline_parts(
     surface: Surface,

@@ -180,7 +180,7 @@ fn meridian_azimuth(meridian: &Curve, axis: &Frame, size: f64) -> Result<f64, St
     let samples: Vec<Point> = samples.collect();
     let radius = |p: &Point| p.x.hypot(p.y);
     let farther = |far: Point, p: Point| if radius(&p) >= radius(&far) { p } else { far };
-    // The farthest point tells the angle best.
+    // The farthest point gives the angle best.
     let farthest = samples.iter().copied().fold(samples[0], farther);
     let reach = radius(&farthest);
     if reach < ON_AXIS * (1.0 + size) {

@@ -56,7 +56,7 @@ impl<'a> EdgeTracer<'a> {
         Self { surface, seeds, extent: Uv::new(u1 - u0, v1 - v0), size }
     }
 
-    /// Returns the uv curve of an edge, over the edge's own parameters; `near_u` tells two sides of a seam apart, `None` where there is
+    /// Returns the uv curve of an edge, over the edge's own parameters; `near_u` distinguishes two sides of a seam, `None` where there is
     /// none. Fails for edges more than [`ACCEPTED`] off the surface.
     pub(super) fn trace(&self, edge: &Curve, near_u: Option<f64>) -> Result<TracedEdge, String> {
         let [t0, t1] = edge.domain();
@@ -136,7 +136,7 @@ impl<'a> EdgeTracer<'a> {
     /// Returns the parameters of the point of the surface that is closest to `p`, within 0.3 of the domain of `near_u` if that is given;
     /// fails where it is more than [`ACCEPTED`] away.
     fn closest(&self, p: Point, near_u: Option<f64>) -> Result<Uv, String> {
-        // A seam's two sides lie a whole domain apart: a third of it tells them.
+        // A seam's two sides lie a whole domain apart: a third of it separates them.
         let allowed = |uv: Uv| near_u.is_none_or(|u| (uv.x - u).abs() <= 0.3 * self.extent.x);
         let seeds = self.seeds.iter().filter(|(uv, _)| allowed(*uv));
         let mut order: Vec<(f64, Uv)> = seeds.map(|(uv, q)| ((*q - p).length_squared(), *uv)).collect();

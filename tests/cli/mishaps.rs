@@ -233,7 +233,7 @@ fn a_folder_has_one_owner_at_a_time() {
     assert!(code == 1 && err.contains(&format!("process {}", child.id())), "{code} {err}");
 }
 
-/// Whether this process, and so every one that it starts, ignores a signal. Where the system does not tell, none is.
+/// Whether this process, and so every one that it starts, ignores a signal. Where the system does not report it, none is.
 #[cfg(unix)]
 fn is_ignored(signal: u32) -> bool {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -353,7 +353,7 @@ fn a_source_in_an_opaque_part_and_an_unknown_medium_are_told() {
 fn half_a_checkpoint_of_a_killed_run_is_removed() {
     let folder = lens(|scene| scene);
     fs::create_dir(folder.path().join("out")).unwrap();
-    // Without the mark of a machine, as earlier versions wrote them: only the age tells whether its process is gone.
+    // Without the mark of a machine, as earlier versions wrote them: only the age shows whether its process is gone.
     let [stale, fresh] = [7, 8].map(|process| format!(".checkpoint.tally.{process}-0.part"));
     for (name, age) in [(&stale, 2 * 86_400), (&fresh, 0)] {
         let file = fs::File::create(folder.path().join("out").join(name)).unwrap();

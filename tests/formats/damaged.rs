@@ -73,7 +73,7 @@ fn damaged(seed: &[u8], random: &mut Random) -> Vec<u8> {
     bytes
 }
 
-/// Reads damaged copies of a file by `read`, which tells whether it took one; some are refused.
+/// Reads damaged copies of a file by `read`, which returns whether it took one; some are refused.
 fn assault(seed: &Path, read: impl Fn(&Path) -> bool) {
     let bytes = fs::read(seed).unwrap();
     assert!(read(seed), "{} is not read undamaged", seed.display());

@@ -217,7 +217,8 @@ fn a_void_within_a_scene_under_water_is_told_to_be_full_of_it() {
     }
 }
 
-/// Light that leaves the scene has a way without end before it: in surroundings that absorb or scatter no far field gets any, which is told.
+/// Light that leaves the scene has a way without end before it: in surroundings that absorb or scatter no far field gets any, which is
+/// reported.
 #[test]
 fn a_far_field_in_surroundings_that_absorb_or_scatter_is_told_to_be_dark() {
     let world = World::default();

@@ -1,5 +1,5 @@
 //! Sources flush with the face of a body: they start in what the scene says that they are inside of, in the face and within the glue
-//! distance to either side of it; where it says nothing they start inside, and that is told.
+//! distance to either side of it; where it is silent they start inside, and that is reported.
 
 use crate::support::{Shape, World};
 use lampyris::formats::{LightRay, write_rays};
@@ -295,7 +295,7 @@ fn flush_sources_that_are_meant_so_are_not_told() {
     assert!(!is_told(&results), "{:?}", results.notes);
 }
 
-/// In the contact of two plates light goes from one into the other: that is told where their indices differ, and not where they are the
+/// In the contact of two plates light goes from one into the other: that is reported where their indices differ, and not where they are the
 /// same, whatever is around them.
 #[test]
 fn a_source_between_plates_is_told_where_they_differ() {

@@ -1,4 +1,4 @@
-//! What became of each ray of a list: ends, faces and powers that can be told by hand.
+//! What became of each ray of a list: ends, faces and powers that can be recognised by hand.
 
 use crate::support::World;
 use lampyris::formats::{Flux, LightRay, Tm25, write_rays, write_tm25};

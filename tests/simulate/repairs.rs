@@ -4,7 +4,7 @@ use crate::support::{Shape, World};
 use lampyris::math::{Frame, Point};
 
 /// The facets of this face lie 0.5 mm, then 5 mm above it, as coarse ones may: farther than 1 mm they are not looked for, light that starts
-/// on the surface meets them from behind, and that is told.
+/// on the surface meets them from behind, and that is reported.
 #[test]
 fn starts_that_are_not_on_their_facets_are_counted() {
     for (height, misplaced) in [(0.5, 0), (5.0, 1000)] {

@@ -120,7 +120,7 @@ fn two_solids_of_one_part_are_told_apart() {
     }
 }
 
-/// A part that stands twice under one name, in two assemblies: the path tells which, the name means both.
+/// A part that stands twice under one name, in two assemblies: the path decides which, the name means both.
 #[test]
 fn places_of_one_name_are_told_apart_by_their_paths() {
     let mut world = World::default();
@@ -261,7 +261,7 @@ fn assert_each_selects_its_own(model: &Model, step: usize) -> usize {
 #[test]
 fn every_face_has_a_selector_of_its_own() {
     assert_eq!(assert_each_selects_its_own(&twins(), 1), 2);
-    // Copies of one part under one name: nothing but their place tells them apart.
+    // Copies of one part under one name: nothing but their place distinguishes them.
     let mut model = twins();
     for k in 1..4 {
         let mut copy = model.instances[0].clone();
@@ -344,8 +344,8 @@ fn a_receiver_in_a_face_is_named() {
     }
 }
 
-/// A receiver that stands in an opening of a face, or fills it, as one in the port of an integrating sphere does, has none of the face in it;
-/// one that reaches over the rim has.
+/// A receiver that stands in an opening of a face, or fills it, as one in the port of an integrating sphere does, has none of the face in
+/// it; one that reaches over the rim has.
 #[test]
 fn a_receiver_in_an_opening_is_in_no_face() {
     let mut world = World::default();

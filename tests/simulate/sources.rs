@@ -42,7 +42,7 @@ fn a_shining_face_of_a_box() {
     assert!((rms[0] - 2.0 / 3f64.sqrt()).abs() < 0.02 && (rms[1] - 1.0 / 3f64.sqrt()).abs() < 0.02, "{rms:?}");
 }
 
-/// Knots tell nothing of lengths: a flat face of 101 even spans, of which one is 18 of its 20 mm long, shines by area. The root mean square
+/// Knots say nothing of lengths: a flat face of 101 even spans, of which one is 18 of its 20 mm long, shines by area. The root mean square
 /// of an even line of ±10 mm is 10/√3; of its ends alone it would be 9.5.
 #[test]
 fn a_face_shines_evenly_whatever_its_knots() {
@@ -106,8 +106,8 @@ fn ray_lists_are_drawn_by_power() {
     }
 }
 
-/// A beam of one ray draws its wavelength alone, neither a place nor a direction, beside a point that draws its direction: half of the power
-/// of two watts goes straight on, and few rays of each are all made together.
+/// A beam of one ray draws its wavelength alone, neither a place nor a direction, beside a point that draws its direction: half of the
+/// power of two watts goes straight on, and few rays of each are all made together.
 #[test]
 fn rays_that_draw_a_wavelength_alone_are_made() {
     let beam = "[[source]]\nkind = 'collimated'\nat = [0, 0, 0]\ndirection = [0, 0, 1]\nspectrum = { kind = 'white_led' }\n";

@@ -171,7 +171,7 @@ fn what_a_broken_transformation_places_is_named_and_left_out() {
     }
 }
 
-/// Two places of a lens and one of a ring, under names that tell nothing (blank, a translator's default, one for all) and under good ones.
+/// Two places of a lens and one of a ring, under names that say nothing (blank, a translator's default, one for all) and under good ones.
 #[test]
 fn places_without_a_name_of_their_own_are_named_by_their_products() {
     let products = "#101=PRODUCT_DEFINITION('','',$,$);\n#102=PRODUCT_DEFINITION('','',#122,$);\n#103=PRODUCT_DEFINITION('','',#123,$);\n\

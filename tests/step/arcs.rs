@@ -1,4 +1,4 @@
-//! Arcs whose vertices stand in the wrong order in the file: the loops beside them tell which part of the circle is meant.
+//! Arcs whose vertices stand in the wrong order in the file: the loops beside them decide which part of the circle is meant.
 
 use crate::files::{MILLIMETRES, part21};
 use crate::support::{Measure, measure};

@@ -11,7 +11,7 @@ fn corners() -> Vec<[f64; 3]> {
     corners
 }
 
-/// Returns the faces that were left out for standing where others do, and what is told of them.
+/// Returns the faces that were left out for standing where others do, and what is reported of them.
 fn repeated(import: &Import) -> Vec<(u64, &str)> {
     let repairs = import.report.repairs.iter().filter(|r| r.reason.contains("it stands where"));
     repairs.map(|r| (r.id, r.reason.as_str())).collect()

@@ -1,5 +1,5 @@
 //! Conics turned about their own axis, as reflectors are made of: every place of such a surface comes twice, with opposite normals, and
-//! only the loops of a face tell which is meant. Areas are those of quadrature over the profile.
+//! only the loops of a face decide which is meant. Areas are those of quadrature over the profile.
 
 use crate::faces::{area, close, import, points};
 use lampyris::math::{Uv, Vector};
@@ -124,7 +124,7 @@ fn faces_of_turned_conics_are_what_their_loops_enclose_on_either_half() {
 #[test]
 fn an_offset_of_a_turned_conic_lies_where_its_edges_are() {
     // A sphere of radius 10 as a turned circle, which is no ellipse in closed form where a trimmed curve says so, 2 mm farther out on its
-    // one half and farther in on the other: the face, a quarter of a cap of radius 12, tells which half is meant.
+    // one half and farther in on the other: the face, a quarter of a cap of radius 12, decides which half is meant.
     let rim = [12.0 * 0.8f64, 12.0 * 0.4];
     let list = [
         (10, [0., 0., 10.]),

@@ -124,7 +124,7 @@ fn a_turned_piece_within_another_is_its_void() {
     }
 }
 
-/// Faces with edges of their own, and a body that lacks a face, tell nothing of where one body ends.
+/// Faces with edges of their own, and a body that lacks a face, say nothing of where one body ends.
 #[test]
 fn a_shell_whose_edges_do_not_close_it_stays_one() {
     let blocks = || [Body::block([0.0; 3], [10.0; 3]), Body::block([20.0, 0.0, 0.0], [30.0, 10.0, 10.0])];

@@ -298,7 +298,7 @@ fn a_surface_of_the_shell_of_a_solid_is_that_solid() {
     );
 }
 
-/// The void of a solid that the list does not name is told; so is a face, and without it the volume tells nothing of the side.
+/// The void of a solid that the list does not name is told; so is a face, and without it the volume says nothing of the side.
 #[test]
 fn entries_of_shells_and_solids_that_are_no_references_are_told() {
     let text = solid_text(&cube_corners(), &CUBE, &[".T."; 6], None);

@@ -187,7 +187,7 @@ fn faces_in_a_set_of_surfaces_are_told() {
         let left_out: Vec<u64> = import.report.left_out.iter().map(|note| note.id).collect();
         assert_eq!((import.model.placed_face_count(), left_out), (faces, told), "{items}");
     }
-    // In the model it is refused, and told by that alone.
+    // In the model it is refused, and reported by that alone.
     let refused = read_sections("", "#900,#901", &data.replace("#71=PLANE('',#14);\n", "")).report;
     assert_eq!((refused.faces.refused, refused.left_out.len()), (1, 0), "{:?}", refused.left_out);
 }
@@ -412,7 +412,7 @@ fn references_that_lead_nowhere_are_told() {
     assert_eq!(read(&plate(0.0)).report.problems, Vec::<String>::new());
     let one = read(&(plate(0.0) + "#80=PRODUCT('','','',(#9999));\n")).report.problems;
     assert!(one.len() == 1 && one[0].ends_with("#9999 is referred to but is not in the file"), "{one:?}");
-    // The statement is skipped, and told of as well.
+    // The statement is skipped, and reported as well.
     let broken = read(&(plate(0.0) + "#80=PRODUCT('','','',(#81));\n#81=VECTOR('',#11;\n")).report.problems;
     assert!(broken.iter().any(|p| p.ends_with("#81 is referred to but could not be read")), "{broken:?}");
 }

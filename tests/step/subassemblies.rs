@@ -124,7 +124,7 @@ fn an_assembly_stands_unmoved_in_each_of_two_that_usages_place() {
 }
 
 /// The assembly #500, in which a usage puts the part to x = 10, by relationships alone in #200 and in #700. Unmoved in both it stands once;
-/// moved it stands in each, which is told where usages do not show that both are assemblies.
+/// moved it stands in each, which is reported where usages do not show that both are assemblies.
 #[test]
 fn an_assembly_that_relationships_put_into_several_products() {
     let places = |[first, second]: [u32; 2], usages: &str| {

@@ -107,7 +107,7 @@ fn poles_of_large_spheres_have_their_normals() {
                 let shell = Shell { faces: vec![Face::whole(surface)], ..Shell::default() };
                 let model = Model::from_part(Part { shells: vec![shell], ..Part::default() });
                 let mesh = tessellate(&model, &Settings::default()).mesh;
-                // Control points are rounded by some ulps of the radius; a normal is told by two that lie a part of the aperture apart.
+                // Control points are rounded by some ulps of the radius; a normal is known from two that lie a part of the aperture apart.
                 let rounding = 64.0 * f64::EPSILON * radius / aperture;
                 let worst = mesh.vertices.iter().map(|v| {
                     let place = mesh.positions[v.position as usize];

@@ -101,7 +101,7 @@ impl ResultsFile {
             let help = "a verdict needs a receiver of kind \"far_field\" with angles \"A\" in a run that counts lm";
             Failure::arguments(format!("{}: {what}", self.path.display())).with_help(help)
         };
-        // The second one tells whether there is a choice to make.
+        // The second one shows whether there is a choice to make.
         match (found.next(), found.next()) {
             (Some(one), None) => Ok(one),
             (None, _) => {

@@ -342,7 +342,7 @@ struct Comparison {
     wrong: usize,
     /// Of those, the ones where the octree is.
     octree_wrong: usize,
-    /// Of those, the ones that even that could not tell.
+    /// Of those, the ones that even that could not decide.
     undecided: usize,
 }
 

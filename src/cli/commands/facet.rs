@@ -46,7 +46,7 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
         &monitor,
     )?;
     let mut settings = mesh_settings(&meshing, None, &loaded.model)?;
-    // The report tells what was reached, measured by other code than the prover's.
+    // The report states what was reached, measured by other code than the prover's.
     settings.measure = true;
     let (mut made, _) = tessellate_model(&loaded.model, &settings, &monitor);
     made.report.seconds.read = loaded.seconds;

@@ -66,8 +66,8 @@ fn looks<'a>(parts: &[NamedPart<'a>]) -> Vec<Vec<NamedPart<'a>>> {
 }
 
 /// Returns the rules for all parts that are placed: one for each name, or where a part of that name has several solids one for those that
-/// look alike; none for solids without faces. Parts of one name that look different are told apart by their instances, as `instances` has
-/// them for each part.
+/// look alike; none for solids without faces. Parts of one name that look different are distinguished by their instances, as `instances`
+/// has them for each part.
 pub(super) fn rule_texts(parts: &[PartAccount], instances: &[Vec<String>]) -> Vec<String> {
     // A selector by name means all parts of that name: what the first one is like is said of all.
     let mut names: Vec<(&str, Vec<NamedPart<'_>>)> = Vec::new();

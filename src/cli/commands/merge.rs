@@ -229,7 +229,7 @@ fn first_header(command: &MergeCommand, patience: &Patience, console: &Console) 
     }
 }
 
-/// Returns the failure of a merge whose arguments mean no part, which tells of an interrupted run in one of them.
+/// Returns the failure of a merge whose arguments mean no part, which mentions an interrupted run in one of them.
 fn no_part(arguments: &[PathBuf]) -> Failure {
     let Some(folder) = arguments.iter().find(|folder| folder.join(CHECKPOINT).is_file()) else {
         let missing = arguments.first().map_or_else(String::new, |p| p.display().to_string());

@@ -119,7 +119,7 @@ fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
         ("--face", !m.face.is_empty(), traces_scene, "it makes facets of its own"),
         ("--role", !m.role.is_empty(), traces_scene, "it makes facets of its own"),
     ];
-    // The first one is told; the others would be in vain too.
+    // The first one is reported; the others would be in vain too.
     let idle = given.iter().find(|(_, given, used, _)| *given && !used);
     let Some((option, _, _, why)) = idle else { return Ok(()) };
     let failure = Failure::arguments(format!("study {} does not take {option}: {why}", kind.name()));
@@ -218,7 +218,7 @@ fn read_model(file: Option<&Path>, console: &Console) -> Result<(Option<Scene>, 
     })
 }
 
-/// Where progress is told.
+/// Where progress is reported.
 type Report<'a> = &'a (dyn Fn(Progress) + Sync);
 
 /// Measures cost and accuracy over tolerances, normals and intersectors; for a scene, also what facets change of each receiver.
@@ -229,7 +229,7 @@ fn study_accuracy(
     progress: Report,
 ) -> Result<StudyResult, Failure> {
     let (scene, loaded, name) = read_model(command.file, console)?;
-    // Measured, because the study tells the sag reached and not the one asked for.
+    // Measured, because the study reports the sag reached and not the one asked for.
     let product = ModelMeshSource::measuring(&loaded.model);
     let mut settings = accuracy::Settings { seed, ..Default::default() };
     if let Some(range) = command.meshing.tolerance {
@@ -278,7 +278,7 @@ fn study_interpolation(
 ) -> Result<StudyResult, Failure> {
     let (_, loaded, name) = read_model(command.file, console)?;
     let mut models: Vec<(String, Model)> = vec![(name, loaded.model)];
-    // Without a file all models that are built in, to tell how the ratios vary.
+    // Without a file all models that are built in, to show how the ratios vary.
     if command.file.is_none() {
         models.extend(study::lamp::lamps().into_iter().map(|l| (format!("{} lamp", l.name), l.model)));
     }

@@ -136,7 +136,7 @@ fn try_places(command: &TraceCommand, part: Option<[u32; 2]>, tracing: &TracingS
     try_folder(folder)
 }
 
-/// Checks what can be told of the options without the scene.
+/// Checks what can be checked of the options without the scene.
 ///
 /// # Errors
 /// For the first that has no meaning, names a file of a kind that is not written, or is not looked at.

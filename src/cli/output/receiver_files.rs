@@ -157,7 +157,7 @@ const ADDITIONAL: usize = 7;
 /// ranges are not those of a whole luminaire.
 ///
 /// A cell holds a mean, LM-63 values between which readers interpolate: all are scaled by one factor, within some thousandths of
-/// 1 and told in the file, so that their flux is `lumens`.
+/// 1 and stated in the file, so that their flux is `lumens`.
 fn photometry(receiver: &ReceiverResult, grid: &Grid, lumens: f64) -> Option<Photometry> {
     let half_turn = [-90.0, 90.0];
     // Light of a luminaire may go up or down alone (LM-63-2002, 5.11).

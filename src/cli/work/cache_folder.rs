@@ -10,7 +10,7 @@ use std::path::PathBuf;
 pub(crate) const FOLDER_VARIABLE: &str = "LAMPYRIS_CACHE";
 /// Says how large it may become.
 const LIMIT_VARIABLE: &str = "LAMPYRIS_CACHE_GB";
-/// Bytes in a gigabyte, as sizes of disks are told.
+/// Bytes in a gigabyte, as sizes of disks are given.
 const BYTES_IN_GB: f64 = 1e9;
 
 /// Returns the cache that the option or, without it, the environment asks for; `None` where neither names a folder.

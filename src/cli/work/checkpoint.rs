@@ -54,7 +54,7 @@ impl<'a> SavePlace<'a> {
         Self { shard: Some(shard), ..self }
     }
 
-    /// Returns the place for the runs of a search, which the text tells from others.
+    /// Returns the place for the runs of a search, which the text distinguishes from others.
     pub(crate) fn with_search(self, search: Option<String>) -> Self {
         Self { search, ..self }
     }

@@ -19,7 +19,7 @@ use std::borrow::Cow;
 const TIMED_RAYS: usize = 20_000;
 /// Time of a round, s, that is enough for the slowest: where that takes longer for [`TIMED_RAYS`], fewer are timed.
 const ROUND_SECONDS: f64 = 0.1;
-/// Rays that tell how many these are.
+/// Rays that show how many these are.
 const PROBED_RAYS: usize = 500;
 /// Timed rounds of every intersector, alternating.
 const TIMED_ROUNDS: usize = 3;

@@ -226,7 +226,7 @@ pub(crate) fn folder_of(path: &Path) -> PathBuf {
     parent.unwrap_or(Path::new(".")).to_path_buf()
 }
 
-/// Refuses a place with less free space than needed; one that does not tell is taken.
+/// Refuses a place with less free space than needed; one that does not report it is taken.
 ///
 /// # Errors
 /// When the file system says that it has less.
@@ -250,7 +250,7 @@ pub(crate) fn require_report_space(folder: &Path, with_report: bool) -> Result<(
     require_space(folder, DOCUMENT_BYTES + if with_report { REPORT_BYTES } else { 0 })
 }
 
-/// Returns the bytes that are left on the folder's file system; `None` where it does not tell.
+/// Returns the bytes that are left on the folder's file system; `None` where it does not report them.
 #[cfg(unix)]
 fn free_bytes(folder: &Path) -> Option<u64> {
     let system = rustix::fs::statvfs(folder).ok()?;

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-/// What tells that a file was written anew: its length and when that was.
+/// What shows that a file was written anew: its length and when that was.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Stamp {
     length: u64,
@@ -256,7 +256,7 @@ mod tests {
         for (seed, rays, scene, says) in [
             (Some(9), 0, "s", ": traced with seed 9, the first part with the seed of its scene"),
             (None, 1234, "t", ": traced with 1234 rays, the first part with 0 rays"),
-            // Scenes may be copies: where they lie is told where nothing else differs.
+            // Scenes may be copies: where they lie is reported where nothing else differs.
             (None, 0, "t", ": traced with the scene t, the first part with the scene s"),
             // Both grow.
             (None, 10_000, "s", "than the first one"),

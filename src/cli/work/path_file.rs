@@ -49,7 +49,7 @@ impl PathFile {
             columns[5].extend(v.power.to_le_bytes());
         }
         let mut state = self.state.lock().unwrap_or_else(|e| e.into_inner());
-        // The first failure is the one that is told.
+        // Only the first failure is reported.
         if state.1.is_none() {
             let slices: Vec<&[u8]> = columns.iter().map(Vec::as_slice).collect();
             state.1 = state.0.write(vertices.len() as u64, &slices).err();

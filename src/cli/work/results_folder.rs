@@ -77,7 +77,7 @@ fn is_of_report(name: &Path) -> bool {
         .any(|(folder, kinds)| name.parent() == Some(Path::new(folder)) && kinds.contains(&extension))
 }
 
-/// Removes what an earlier run left in the folder, as far as its `results.json` and the names of its own tell, so that no file of it stands
+/// Removes what an earlier run left in the folder, as far as its `results.json` and the names of its own show, so that no file of it stands
 /// beside those of this run. Files that the scene names stay; a failure is passed over, because what is written next replaces most of them.
 fn remove_earlier(prepared: &PreparedScene, folder: &Path) {
     let Some(earlier) = read_text(&folder.join("results.json")).ok() else { return };
@@ -143,7 +143,7 @@ pub(crate) fn write_anywhere(
     places.find(|folder| {
         let written = write(prepared, folder, run, remarks, with_report, console);
         if written.is_err() {
-            // Half of the results tells nobody anything.
+            // Half of the results is of no use.
             let _ = std::fs::remove_dir_all(folder);
         }
         written.is_ok()

@@ -14,7 +14,7 @@ pub(crate) struct RunCommands {
     /// What that one searches for with runs of growing length; `None` where it asks for a single run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     search: Option<String>,
-    /// Those that traced the parts of a sum, or of a run that goes on with one; empty where `command` tells all.
+    /// Those that traced the parts of a sum, or of a run that goes on with one; empty where `command` says all.
     #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
     traced_by: BTreeSet<String>,
 }
@@ -30,7 +30,7 @@ impl RunCommands {
         Self { traced_by, ..self }
     }
 
-    /// Returns those of a run that this command goes on with, and that is owed to the `earlier` ones so far. The one that began it tells
+    /// Returns those of a run that this command goes on with, and that is owed to the `earlier` ones so far. The one that began it states
     /// all, but for a sum of parts.
     pub(crate) fn continue_from(self, earlier: &Self) -> Self {
         let mut commands = earlier.clone();
@@ -93,7 +93,7 @@ mod tests {
             assert_eq!(own().search_on_from(&other), own());
         }
         assert_eq!(own().search_on_from(&commands("merge", None, &["a", "b"])), own());
-        // A search that goes on with the run of another command did not begin it, and what it comes to then is not told by that one.
+        // A search that goes on with the run of another command did not begin it, and what it comes to then is not reported by that one.
         let resumed = own().continue_from(&commands("plain", None, &[]));
         assert_eq!(commands("again", Some("1%"), &[]).search_on_from(&resumed), commands("again", Some("1%"), &[]));
     }

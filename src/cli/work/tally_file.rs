@@ -157,7 +157,7 @@ impl TallyHeader {
     /// Returns in words what a part of another run differs in from the `first` one: the seed, the rays, options of the facets and of the
     /// tracing; where these are alike, the place of the scene, of which there may be copies; `None` where that is the same, too.
     pub(crate) fn difference(&self, first: &Self) -> Option<String> {
-        // The length of a run that grows tells it from no other.
+        // The length of a run that grows distinguishes it from no other.
         let grow = [self, first].iter().all(|h| h.run_rays.is_multiple_of(GROWING_REPLICATE));
         let words = |h: &Self| {
             let seed = h.seed.map_or_else(|| "the seed of its scene".to_owned(), |seed| format!("seed {seed}"));

@@ -115,7 +115,7 @@ impl Monitor for TerminalMonitor<'_> {
             (_, NormalMode::Exact) => format!("on facets of {tolerance} with hits moved to the spline"),
             _ => format!("on facets of {tolerance} with {} normals", chosen.normals),
         };
-        // Why is told with the results.
+        // The reason is printed with the results.
         self.console.say(format_args!("tracing {how}"));
     }
 

@@ -216,7 +216,7 @@ fn time_chart(rows: &[&Value]) -> Chart {
             text(r, "intersector") == "exact"
                 || text(r, "intersector") == "octree" && text(r, "normals") == "bilinear"
         })
-        // More bars than that cannot be told apart.
+        // More bars than that cannot be distinguished.
         .take(14)
         .collect();
     let name = |r: &&&Value| match (text(r, "intersector"), r["adaptive"].as_bool()) {

@@ -75,7 +75,7 @@ pub(super) fn media_on_opaque(scene: &Scene, model: &Model, of_face: &[u32], opa
         .filter(|f| of_face[f.id.index()] != AMBIENT || opaque[f.id.index()])
         .map(|f| (f.id.index(), box_of(f)))
         .collect();
-    // By their lower x: the order of the pairs tells which of them are marked unasked.
+    // By their lower x: the order of the pairs decides which of them are marked unasked.
     faces.sort_by(|a, b| a.1.min.x.total_cmp(&b.1.min.x));
     let (faces, boxes): (Vec<usize>, Vec<Aabb>) = faces.into_iter().unzip();
     let mut nearest = Nearest::new(model);

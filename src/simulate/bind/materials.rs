@@ -31,7 +31,7 @@ impl<'s> SurfaceTable<'s> {
     /// Returns the index of the surface that a rule gives, by its index in `scene.materials`; of the scene's `default_surface` without one.
     ///
     /// # Errors
-    /// When the rule gives a surface of values that do not go together, or there are more surfaces than can be told apart.
+    /// When the rule gives a surface of values that do not go together, or there are more surfaces than can be distinguished.
     pub(super) fn index(&mut self, rule: Option<usize>) -> Result<u16, Error> {
         let scene = self.scene;
         let place = rule.unwrap_or(scene.materials.len());

@@ -40,7 +40,7 @@ use select::FaceSearch;
 /// What the box of a scene is grown by, as a share of its diagonal: room for what facets and rounding put outside the splines' boxes.
 const REGION_MARGIN: f64 = 1e-3;
 
-/// Sources from which on boxes tell which of them lie clear of all solids: of fewer some rays are asked in less time.
+/// Sources from which on boxes decide which of them lie clear of all solids: of fewer some rays are asked in less time.
 const MANY_SOURCES: usize = 64;
 
 impl Scene {
@@ -49,7 +49,7 @@ impl Scene {
     /// # Errors
     /// When the scene has no source, a rule, a source or a receiver means nothing in the model, values of a rule do not go together, a face
     /// is an interface of a part without a medium, a file of a source cannot be read, a medium has no index at the light's wavelengths, or
-    /// there are more surfaces or media than the tracer tells apart.
+    /// there are more surfaces or media than the tracer distinguishes.
     pub fn bind(&self, model: &Model) -> Result<BoundScene, Error> {
         if self.sources.is_empty() {
             let error = self.error(ErrorKind::Value, &[], "the scene has no source");
@@ -144,7 +144,7 @@ struct Faces {
 /// none where bodies are not `nested`. A face that no rule names is a bare interface where it has a medium, else `default_surface`.
 ///
 /// # Errors
-/// When a rule gives a surface of values that do not go together, or the rules together more surfaces than can be told apart.
+/// When a rule gives a surface of values that do not go together, or the rules together more surfaces than can be distinguished.
 fn bind_faces(
     scene: &Scene,
     model: &Model,

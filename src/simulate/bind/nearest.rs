@@ -96,11 +96,11 @@ impl<'a> Nearest<'a> {
         if let Some(face) = placed.face {
             let slab = self.slabs[index].get_or_insert_with(|| Slab::new(&face.surface));
             let local = placed.placement.local_point(p);
-            // Two planes cost a hundredth of the search for the foot, and tell most points that are far.
+            // Two planes cost a hundredth of the search for the foot, and find most points that are far.
             if slab.distance_below(local) * placed.placement.scale > limit {
                 return false;
             }
-            // Within a reflector planes tell nothing; what lies in no box around a piece is far from all of them.
+            // Within a reflector planes say nothing; what lies in no box around a piece is far from all of them.
             let pieces = self.pieces[index].get_or_insert_with(|| PieceBoxes::new(&face.surface));
             if !pieces.are_within(local, limit / placed.placement.scale) {
                 return false;

@@ -81,7 +81,7 @@ pub(super) fn check_indices(scene: &Scene, loaded: &[Option<Loaded>], bodies: &[
         };
         wavelengths.sort_by(f64::total_cmp);
         wavelengths.dedup();
-        // A dispersion formula may fail in the middle of a spectrum, so that its ends do not tell.
+        // A dispersion formula may fail in the middle of a spectrum, so that its ends do not show it.
         for nm in wavelengths {
             let wrong = bodies.iter().find(|b| !Index::RANGE.contains(&b.index(Some(nm))));
             if let Some(body) = wrong {

@@ -54,7 +54,7 @@ pub(crate) struct Emitter {
     pub(crate) rays: Option<u64>,
     /// Bodies that the scene states around it, outermost first; empty where it states none.
     pub(crate) inside: SmallVec<[u32; 4]>,
-    /// Whether the scene states what it lies in; else geometry tells.
+    /// Whether the scene states what it lies in; else geometry decides.
     pub(crate) media_stated: bool,
     /// What wavelengths are drawn from; `None` where the scene has but one, or its rays have their own.
     wavelengths: Option<Wavelengths>,

@@ -94,7 +94,7 @@ fn find_siblings(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Siblings {
 /// that face, as next to the edge of a wedge: its body ends where the other begins.
 #[inline(never)]
 pub(super) fn aligned_body(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<FaceHit> {
-    // The direction of the ray against the outward normal tells whether it goes in or out, whichever of the two
+    // The direction of the ray against the outward normal shows whether it goes in or out, whichever of the two
     // faces is met first.
     let entering = ray.direction.dot(at.hit.geometric_normal) < 0.0;
     let probe = probe_at(context, ray, at);
@@ -273,7 +273,7 @@ pub(super) enum ContactSurface {
 pub(super) fn contact_surface(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> ContactSurface {
     let counts = |other: &FaceOptics| touches_other(&at.face, other) || may_be_siblings(&at.face, other);
     let Some(partner) = touching_face(context, ray, at, counts) else { return ContactSurface::Bare };
-    // Bare: what happens follows from the two media alone, and from whichever face it is told the same.
+    // Bare: what happens follows from the two media alone, and is the same from whichever face.
     let is_bare = |f: &FaceOptics| context.bound.surfaces[f.surface as usize] == Surface::Interface;
     let entering = ray.direction.dot(at.hit.geometric_normal) < 0.0;
     match [is_bare(&at.face), is_bare(&partner.face)] {

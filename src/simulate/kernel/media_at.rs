@@ -27,13 +27,13 @@ const LONGEST_LOOK: f64 = 1.0;
 /// that agree decide, or the first where none do.
 pub(super) fn media_at(context: &Context<'_>, ray: &Ray) -> Bodies {
     let mut bodies = media_on_way_out(context, ray);
-    // A way that comes in by the opening of a body and leaves by a face would tell that it began there. Sources beside such a body were
+    // A way that comes in by the opening of a body and leaves by a face would imply that it began there. Sources beside such a body were
     // asked ray by ray for that.
     bodies.retain(|&mut body| is_within_box(context, body, ray.origin));
     bodies
 }
 
-/// Whether a point, mm, lies in the box around a body, as far as rounding and faces that touch let one tell.
+/// Whether a point, mm, lies in the box around a body, as far as rounding and faces that touch allow.
 fn is_within_box(context: &Context<'_>, body: u32, point: Point) -> bool {
     context.bound.bodies[body as usize].bounds.grown(context.glue_mm() + rounding_at(point)).contains(point)
 }
@@ -200,7 +200,7 @@ struct PassedFace {
 struct PassedFaces(SmallVec<[PassedFace; 8]>);
 
 impl PassedFaces {
-    /// Whether a face was passed there, as far as rounding, mm, lets one tell. The last are asked, for only those may be as near.
+    /// Whether a face was passed there, as far as rounding, mm, allows. The last are asked, for only those may be as near.
     fn contains(&self, other: &PassedFace, rounding: f64) -> bool {
         self.0.iter().rev().take(MOST_COINCIDENT_FACES).any(|passed| {
             passed.face == other.face

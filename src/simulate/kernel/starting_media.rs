@@ -63,7 +63,7 @@ fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter, has_m
     let mut asked: Option<[u32; 2]> = None;
     for k in 0..PROBED_RAYS {
         // Over all replicates and the whole of each: they are spread over the whole of a ray list. As many where replicates are few, of
-        // which each has several then: two rays would tell nothing of a source that straddles a boundary.
+        // which each has several then: two rays would say nothing of a source that straddles a boundary.
         let replicate = (k * u64::from(replicates) / PROBED_RAYS) as u32;
         let Some((replicate, [from, to])) = replicate_with_rays(&context.plan, source, replicate) else { continue };
         let index = ((to - from) * k / PROBED_RAYS) as u32;

@@ -4,7 +4,7 @@
 //!
 //! Known weaknesses: between two bodies that touch there is no room, so that light that is stated to be in neither counts as coming out of
 //! the one behind it. Light that is stated to be outside of a body and starts in an edge of it is aimed at that edge, where two faces let
-//! it in at once: what goes into the body may be lost, and is told as such.
+//! it in at once: what goes into the body may be lost, and is reported as such.
 
 use super::context::Context;
 use super::tolerances::{ALIGNED, MOST_COINCIDENT_FACES, rounding_at, way_through_glue};

@@ -94,7 +94,7 @@ impl Key {
     fn with_digits_of_net(&self, purpose: Purpose, second: usize, bits: u64) -> u64 {
         let Some((index, dimensions)) = self.in_net.zip(purpose.dimensions(self.bounce)) else { return bits };
         let dimension = dimensions[second];
-        // Each source has a net of its own in each replicate: the first of its rays there tells both.
+        // Each source has a net of its own in each replicate: the first of its rays there identifies both.
         let net = self.ray.wrapping_sub(u64::from(index));
         let scramble = hash([self.seed, net, u64::from(self.branch) << 32 | dimension as u64]);
         let digits = scrambled(index, dimension, scramble) >> (32 - NET_DIGITS);

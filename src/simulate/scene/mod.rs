@@ -195,7 +195,7 @@ impl Scene {
 
     /// Checks all values, in the order of the file's keys, and that the receivers' cells fit into memory.
     fn check(&self) -> Result<(), Error> {
-        // In the order of the file's keys, so that the first fault told is one that stands far up.
+        // In the order of the file's keys, so that the first fault reported is one that stands far up.
         let origin = &self.origin;
         self.run.check(origin)?;
         self.accuracy.check(origin)?;
@@ -237,8 +237,8 @@ impl Scene {
         Ok(())
     }
 
-    /// Refuses two entries of one name in the list `key`, by which nobody could tell them apart; several may have none. `kind` is what they
-    /// are called in a sentence.
+    /// Refuses two entries of one name in the list `key`, by which nobody could distinguish them; several may have none. `kind` is what
+    /// they are called in a sentence.
     fn check_names<'a>(&self, key: &str, kind: &str, names: impl Iterator<Item = &'a str>) -> Result<(), Error> {
         let mut known = HashSet::new();
         for (i, name) in names.enumerate().filter(|(_, name)| !name.is_empty()) {

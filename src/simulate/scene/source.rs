@@ -45,7 +45,7 @@ pub struct Source {
     pub at: [f64; 3],
     /// Main direction; need not be of unit length.
     pub direction: [f64; 3],
-    /// Direction of the first side of `size`, as far as `direction` lets it; of light from an IES or EULUMDAT file it tells the turn about
+    /// Direction of the first side of `size`, as far as `direction` lets it; of light from an IES or EULUMDAT file it sets the turn about
     /// `direction` too, see `file`.
     pub x: Option<[f64; 3]>,
     /// Radius of a disc, mm; a `frame` that enlarges moves the source and leaves it.
@@ -59,7 +59,7 @@ pub struct Source {
     #[cfg_attr(feature = "schema", schemars(range(min = 0, max = 1e6)))]
     pub exponent: Option<f64>,
     /// Names of the instances that the source lies inside of, outermost first; `[]` for none. Within `glue_mm` of a face its light
-    /// starts on the side of it where that is true. Without `inside` geometry tells: light that goes into a body and starts within
+    /// starts on the side of it where that is true. Without `inside` geometry decides: light that goes into a body and starts within
     /// `glue_mm` of its face, on either side, starts inside, as if glued to it, and a note says so. Faces that shine (`on`) do so outward.
     pub inside: Option<OneOrMany<String>>,
     /// Spectrum, in watts (in a run that counts lumens too: its light is then weighed by what the eye sees of it); the line

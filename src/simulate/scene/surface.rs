@@ -66,7 +66,7 @@ impl Material {
         if let Some((key, _, _, owner)) = keys.into_iter().find(|(_, given, allowed, _)| *given && !allowed) {
             return Err((key, format!("`{key}` belongs to {owner}")));
         }
-        // The rows tell both shares at every angle and wavelength that they have.
+        // The rows give both shares at every angle and wavelength that they have.
         let shares = [("reflectance", self.reflectance.is_some()), ("transmittance", self.transmittance.is_some())];
         match shares.into_iter().find(|(_, given)| *given && self.coating.is_some()) {
             Some((key, _)) => Err((
@@ -186,7 +186,7 @@ fn coating_from_rows(rows: &[Vec<f64>]) -> Result<Coating, String> {
 fn coating_from_grid(rows: impl Iterator<Item = ([f64; 2], Split)>) -> Result<Coating, String> {
     let (keys, cells): (Vec<[f64; 2]>, Vec<Split>) = rows.unzip();
     let first = keys.first().ok_or("the table is empty")?[0];
-    // The first angle's rows tell the wavelengths; the rest must repeat them.
+    // The first angle's rows give the wavelengths; the rest must repeat them.
     let columns = keys.iter().take_while(|k| k[0] == first).count();
     let nm: Vec<f64> = keys[..columns].iter().map(|k| k[1]).collect();
     let angles: Vec<f64> = keys.iter().step_by(columns).map(|k| k[0]).collect();

@@ -259,7 +259,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             let (a, b) = ends(second);
             let to = |p: Point| (p - a).length().min((p - b).length());
             let (start, end) = ends(first);
-            // Only by a clear margin, and with a third segment to tell: two alone may join either way.
+            // Only by a clear margin, and with a third segment to decide: two alone may join either way.
             if to(start) < 0.5 * to(end) && curves.len() > 2 {
                 curves[0] = curves[0].reversed();
             }

@@ -20,7 +20,7 @@ struct Elementary<'f, 'a> {
 }
 
 impl<'f, 'a> GeometryReader<'f, 'a> {
-    /// Returns the chart of an elementary surface, or why it is refused; `None` for any other kind. `extent` tells which part of a
+    /// Returns the chart of an elementary surface, or why it is refused; `None` for any other kind. `extent` decides which part of a
     /// self-touching torus is meant.
     pub(super) fn elementary_surface(&self, e: Entity<'f, 'a>, extent: FaceExtent<'_>) -> Option<Outcome<Chart>> {
         type Reader<'f, 'a> = fn(&GeometryReader<'f, 'a>, Elementary<'f, 'a>, FaceExtent<'_>) -> Outcome<Chart>;
@@ -130,14 +130,14 @@ enum TorusRegion {
     Both,
 }
 
-/// Tells on which part of a self-touching torus (radii in mm) points lie; the apple where none tells.
+/// Tells on which part of a self-touching torus (radii in mm) points lie; the apple where none decides.
 fn torus_region(frame: &Frame, major: f64, minor: f64, points: &[Point]) -> TorusRegion {
     let off = |center: f64, p: &Point| {
         let q = frame.local_point(*p);
         ((q.x.hypot(q.y) - center).hypot(q.z) - minor).abs()
     };
     let near = TORUS_REGION_SHARE * minor;
-    // Points on the circles where the parts meet tell nothing.
+    // Points on the circles where the parts meet say nothing.
     let only = |a: f64, b: f64| points.iter().any(|p| off(a, p) < near && off(b, p) > near);
     match (only(major, -major), only(-major, major)) {
         (true, true) => TorusRegion::Both,

@@ -108,7 +108,7 @@ fn uncertain_length(uncertainty: Entity<'_, '_>, unit: f64) -> Option<f64> {
     let args = uncertainty.all_args().find(|a| a.real(0).is_some())?;
     let factor = match args.entity(1).and_then(|u| unit_factor(u, 0)) {
         Some((kind, factor, _)) => (kind == Kind::Length).then_some(factor)?,
-        // The name of the value tells what it measures where the unit does not.
+        // The name of the value says what it measures where the unit does not.
         None => args.typed(0).is_none_or(|(name, _)| name.ends_with("LENGTH_MEASURE")).then_some(unit)?,
     };
     Some(args.real(0)? * factor)

@@ -1,4 +1,4 @@
-//! Products, usages and representations: the structure of a file, from which a walk tells which representation stands where.
+//! Products, usages and representations: the structure of a file, from which a walk finds which representation stands where.
 //!
 //! Source: ISO 10303-43, -44 and -41: usages of products, and the relationships of their representations.
 

@@ -13,7 +13,7 @@ use crate::math::Frame;
 use crate::step::part21::Entity;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-/// What CONTEXT_DEPENDENT_SHAPE_REPRESENTATIONs tell besides the placements of usages.
+/// What CONTEXT_DEPENDENT_SHAPE_REPRESENTATIONs state besides the placements of usages.
 #[derive(Default)]
 pub(super) struct ContextualPlaces {
     /// The relationships that are those of usages.
@@ -35,7 +35,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
             // Each placement is in the units of the representation that holds it.
             let (mut holder_from, mut holder_to) = (first, second);
             let is_swapped = self.is_item(to, first) && self.is_item(from, second);
-            // Where both representations hold both placements, the relationship tells which is whose.
+            // Where both representations hold both placements, the relationship decides which is whose.
             if is_swapped && !(self.is_item(from, first) && self.is_item(to, second)) {
                 (holder_from, holder_to) = (second, first);
             }
@@ -231,8 +231,8 @@ impl<'f, 'a> Assembly<'f, 'a> {
         }
     }
 
-    /// Returns the mapped items of a usage's own shape that show its child, and where each puts it in the parent; `None`, which is told,
-    /// where that cannot be read.
+    /// Returns the mapped items of a usage's own shape that show its child, and where each puts it in the parent; `None`, which is
+    /// reported, where that cannot be read.
     fn mapped_occurrences(&mut self, usage: u64, shape: u64) -> Vec<(u64, Option<Frame>)> {
         let child = self.file.entity(usage).and_then(usage_attributes).and_then(|a| a.id(4));
         let Some(child) = child else { return Vec::new() };
@@ -266,7 +266,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
 
     /// Links the two representations of a relationship: one way by its transformation, or both ways, unmoved, if it has none. Where the
     /// product of the first uses that of the second, their ends are swapped; where it does so by way of others, which place it, as
-    /// in the `conflicts`, the relationship places nothing, which is told. Returns the link of a transformation between two products.
+    /// in the `conflicts`, the relationship places nothing, which is reported. Returns the link of a transformation between two products.
     pub(super) fn read_relationship(
         &mut self,
         e: Entity<'f, 'a>,

@@ -3,7 +3,7 @@
 //!
 //! Neighbours run along their common edge in opposite directions. A face whose flag of sense says otherwise is turned, if few do.
 //!
-//! Some exporters write the shell of a mirrored part so, and its readers turn it. The volume tells, by the divergence theorem over a
+//! Some exporters write the shell of a mirrored part so, and its readers turn it. The volume decides, by the divergence theorem over a
 //! grid of points on each face. First on few; where that says inside out on more, and of thin walls, whose volume is what is left of
 //! larger terms, with a bound on the error face by face. Where that is not met the file is believed.
 
@@ -27,7 +27,7 @@ const EDGE_OF_THIN: usize = 24;
 
 /// Returns the indices of faces, ascending, whose sense contradicts their neighbours'. In each set of faces joined by edges that two of
 /// them use, faces fall into two groups that contradict each other along all edges between them; the smaller one is returned. None of a set
-/// whose edges give no two groups (a Möbius band) or groups of one size. Whether all look inwards is not told.
+/// whose edges give no two groups (a Möbius band) or groups of one size. Whether all look inwards is not decided.
 pub(crate) fn faces_against_neighbours(faces: &[Face]) -> Vec<usize> {
     // For each edge the faces that use it and whether they run along it.
     let mut uses: FxHashMap<EdgeId, Vec<(usize, bool)>> = FxHashMap::default();
@@ -74,7 +74,7 @@ pub(crate) fn faces_against_neighbours(faces: &[Face]) -> Vec<usize> {
             next += 1;
         }
         let count = group.iter().filter(|(_, turned)| *turned).count();
-        // By majority; that the whole shell may look inwards is told by its volume.
+        // By majority; that the whole shell may look inwards is shown by its volume.
         if is_consistent && 2 * count != group.len() {
             let fewer = 2 * count < group.len();
             out.extend(group.into_iter().filter(|(_, turned)| *turned == fewer).map(|(k, _)| k));

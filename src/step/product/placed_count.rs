@@ -49,7 +49,7 @@ struct OpenCount {
     children: Vec<u64>,
 }
 
-/// Returns the count of `root` and of all below it. `known` holds what is counted, and gets the rest; `open` tells of one what it places
+/// Returns the count of `root` and of all below it. `known` holds what is counted, and gets the rest; `open` returns what one places
 /// itself.
 fn count_below(root: u64, known: &mut FxHashMap<u64, u64>, mut open: impl FnMut(u64) -> OpenCount) -> u64 {
     if let Some(count) = known.get(&root) {

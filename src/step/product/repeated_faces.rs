@@ -95,7 +95,7 @@ fn are_one(a: &Face, b: &Face, part: &Part, units: Units) -> bool {
         return false;
     }
     let tolerance = units.accuracy_on_face(a.surface.bounds().diagonal());
-    // A border tells its plane, however that is written.
+    // A border determines its plane, however that is written.
     let are_planes = matches!(a.analytic, Analytic::Plane { .. }) && !a.loops.is_empty();
     let is_opposed = are_planes && middle_normal(&a.surface).dot(middle_normal(&b.surface)) < 0.0;
     // The two sides of a sheet are two faces.

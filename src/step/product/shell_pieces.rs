@@ -1,7 +1,7 @@
-//! What the edges of a shell tell of it: whether it is closed, and whether it is several shells that share no edge.
+//! What the edges of a shell show: whether it is closed, and whether it is several shells that share no edge.
 //!
 //! Some exporters list the faces of bodies that touch, or are apart, as one closed shell: light goes from one body into the next only
-//! where these are two. A piece within another one that looks the other way is a void; boxes tell what may be within. Shells whose faces
+//! where these are two. A piece within another one that looks the other way is a void; boxes show what may be within. Shells whose faces
 //! have edges of their own each, and those with a piece that is not closed by its edges, are left as they are. Known weakness: a body in
 //! the recess of another that looks the other way is taken as a void of it.
 
@@ -46,7 +46,7 @@ enum PieceRole {
     Solid,
     /// A void of the solid whose outer piece is this one.
     VoidOf(usize),
-    /// Nobody can tell: it stays in the shell of that piece.
+    /// Nothing decides: it stays in the shell of that piece.
     PartOf(usize),
 }
 

@@ -1,4 +1,4 @@
-//! Faces into shells, and shells into solids, as their plans say; what cannot be as a plan says is mended and told.
+//! Faces into shells, and shells into solids, as their plans say; what cannot be as a plan says is mended and reported.
 
 use super::numbering::{ConvertedPart, repair_note};
 use super::orientation::{FaceBoxes, faces_against_neighbours, is_inside_out};
@@ -46,7 +46,7 @@ pub(super) fn add_shells(
             face.layer = face.layer.or_else(|| layer.clone());
             own.push(face);
         }
-        // Only a whole shell tells by its volume which way it faces.
+        // Only a whole shell shows by its volume which way it faces.
         let is_whole = plan.whole && own.len() == plan.faces.len();
         removed.extend(mend_faces(geometry, &mut own, part, out));
         if plan.void {
@@ -167,7 +167,7 @@ impl SolidShells<'_, '_, '_> {
         }
     }
 
-    /// Turns the faces of a whole shell of a solid that certainly looks the wrong way, and tells it.
+    /// Turns the faces of a whole shell of a solid that certainly looks the wrong way, and reports it.
     fn turn_if_inside_out(&self, plan: &ShellPlan, faces: &mut [Face], void: bool, out: &mut ConvertedPart) {
         if is_inside_out(faces, void) {
             faces.iter_mut().for_each(|face| face.reversed ^= true);

@@ -20,7 +20,7 @@ pub(super) struct ProductLink {
     /// The representations of both.
     pub(super) holder: u64,
     pub(super) shown: u64,
-    /// `None` where the mapped item tells it.
+    /// `None` where the mapped item states it.
     pub(super) placement: Option<Frame>,
 }
 
@@ -54,7 +54,7 @@ impl Assembly<'_, '_> {
             }
             for link in links {
                 let in_item = || self.mapping(link.by, link.holder)?.placement;
-                // One that cannot be read is told by the walk.
+                // One that cannot be read is reported by the walk.
                 let Some(frame) = link.placement.or_else(in_item) else { continue };
                 let placement = UsagePlacement::Stated(frame);
                 let added = Usage { child, name: String::new(), id: link.by, placement };

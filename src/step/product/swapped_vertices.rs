@@ -1,6 +1,6 @@
-//! Arcs whose vertices the file has in the wrong order, told by the loops that run along them.
+//! Arcs whose vertices the file has in the wrong order, recognised by the loops that run along them.
 //!
-//! The same two vertices bound both parts of a circle, and which one is meant their order tells. Where it is wrong, both faces beside the
+//! The same two vertices bound both parts of a circle, and their order decides which one is meant. Where it is wrong, both faces beside the
 //! arc find it against their neighbours; where the flag of one use is wrong, one does.
 
 use super::face_edges::{directed_uses, following_tolerance};

@@ -117,7 +117,7 @@ impl ProductsAbove {
         in_use
     }
 
-    /// Returns a product and a component with their numbers; `None` where the numbers tell that the one does not use the other: that of
+    /// Returns a product and a component with their numbers; `None` where the numbers show that the one does not use the other: that of
     /// which nothing is above, or what comes behind the product.
     fn number_pair(&self, ids: [u64; 2]) -> Option<NumberedPair> {
         // What has no number is above no component.

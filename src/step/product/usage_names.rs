@@ -1,4 +1,4 @@
-//! Names of the places of parts: what a usage is called, or its product where the usage's name tells nothing.
+//! Names of the places of parts: what a usage is called, or its product where the usage's name says nothing.
 //!
 //! Writers often leave the name of a NEXT_ASSEMBLY_USAGE_OCCURRENCE blank, or give the same one to all.
 
@@ -106,7 +106,7 @@ pub(super) fn name_usages(file: &File<'_>, products: &mut ProductNames, usages: 
     }
 }
 
-/// Returns what the occurrence of a usage is called in paths: by its name, or by its product where that tells nothing.
+/// Returns what the occurrence of a usage is called in paths: by its name, or by its product where that says nothing.
 pub(super) fn name_in_path<'u>(usage: &'u Usage, product: &'u str) -> &'u str {
     // `=>[0:1:1:2]` is a label of OpenCASCADE's document, not a name.
     if usage.name.is_empty() || usage.name.starts_with("=>[") { product } else { &usage.name }

@@ -2,7 +2,7 @@
 //!
 //! From the products that no other uses along their usages, and inside representations along relationships and mapped items. Shapes that
 //! no product reaches are placed where they are. Guarantee: the depth of an assembly costs no depth of calls, and what ends the walk
-//! early is told: a cycle, the depth of [`MAX_DEPTH`], or the number of visits.
+//! early is reported: a cycle, the depth of [`MAX_DEPTH`], or the number of visits.
 
 use super::assembly::{Assembly, MAX_DEPTH, PlacedRepresentation};
 use super::places::{Place, PlaceTable};
@@ -26,7 +26,7 @@ struct Walk<'f, 'a> {
     limit: u64,
     reached: FxHashSet<u64>,
     in_orphans: bool,
-    /// Entities of which a problem is told already.
+    /// Entities of which a problem is reported already.
     told: FxHashSet<u64>,
     /// What products reach; orphans do not place it again.
     by_products: FxHashSet<u64>,
@@ -160,7 +160,7 @@ impl Walk<'_, '_> {
         }
     }
 
-    /// Counts a visit with so many entities around it, and tells whether there may be one; beyond the limit none is counted any more.
+    /// Counts a visit with so many entities around it, and returns whether there may be one; beyond the limit none is counted any more.
     fn is_within_limit(&mut self, owners: usize) -> bool {
         if !self.is_exhausted() {
             self.visited += 1 + (owners / OWNERS_PER_VISIT) as u64;
@@ -363,7 +363,7 @@ impl Walk<'_, '_> {
         OpenRepresentation { visit, mapped_items, links, next: 0 }
     }
 
-    /// Returns the visit of what a mapped item of a placed representation shows; `None`, which is told, where its place cannot be read.
+    /// Returns the visit of what a mapped item of a placed representation shows; `None`, which is reported, where its place cannot be read.
     fn mapped_visit(&mut self, outer: &Visit, item: u64) -> Option<Visit> {
         let link = self.assembly.mapping(item, outer.representation)?;
         let Some(local) = link.placement else {

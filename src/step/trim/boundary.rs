@@ -77,7 +77,7 @@ pub(crate) fn bound_region(
             let mut two = winding.into_iter();
             let (Some(a), Some(mut b)) = (two.next(), two.next()) else { return Err("no loop") };
             // One must run each way, or the material would lie on the same side of both. On a surface closed both ways the first
-            // one tells which side is meant.
+            // one decides which side is meant.
             if a.winding == b.winding {
                 b.reverse();
                 out.repairs
@@ -107,7 +107,7 @@ fn add_with_holes(outer: Chain, holes: impl IntoIterator<Item = Chain>, chart: &
 }
 
 /// Adds loops that wind around nothing, with these polygons, to `out`: the largest is the outer one, except on a closed surface, where
-/// loops that all run clockwise leave the rest of the surface as the face, and one that bounds as much either way tells nothing.
+/// loops that all run clockwise leave the rest of the surface as the face, and one that bounds as much either way says nothing.
 fn bound_without_winding(
     mut plain: Vec<Chain>,
     polygons: &[Vec<Uv>],
@@ -214,7 +214,7 @@ fn extend_to_border(
     let across = 1 - along;
     let upper = if along == 0 { forward } else { !forward };
     let polygon = chain.polygon();
-    // The loop's mean height tells which poles and borders lie on its left.
+    // The loop's mean height decides which poles and borders lie on its left.
     let mean = polygon.iter().map(|p| p[across]).sum::<f64>() / polygon.len() as f64;
     let side = |x: f64| if upper { x > mean } else { x < mean };
     let pole = chart.poles.iter().find(|p| p.fixed == across && side(p.parameter));

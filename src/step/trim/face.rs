@@ -177,7 +177,7 @@ fn bridged_step(chains: &[Chain]) -> Option<String> {
     (bridged > 0.0).then(|| format!("edges of a loop are {} mm apart", figures(bridged, 3)))
 }
 
-/// Arranges the chains of a face by [`bound_region`]; where they bound nothing, a step between their edges may be why, and is told too.
+/// Arranges the chains of a face by [`bound_region`]; where they bound nothing, a step between their edges may be why, and is reported too.
 fn bound_chains(task: &FaceTask<'_>, chains: Vec<Chain>, step: Option<&str>) -> Result<Boundary, String> {
     bound_region(chains, &task.chart, task.implicit_outer, &task.budget).map_err(|reason| match step {
         Some(step) => format!("{reason}; {step}"),

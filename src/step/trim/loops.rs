@@ -263,7 +263,7 @@ impl Connection<'_> {
         let pole = chart.poles.iter().filter(near_pole).min_by(|a, b| off(a).total_cmp(&off(b)));
         let Some(pole) = pole else {
             let distance = (p - q).length();
-            // A little apart is one point written twice; more than that is bridged, and told.
+            // A little apart is one point written twice; more than that is bridged, and reported.
             if distance > 10.0 * tolerance || distance > tolerance && self.is_wide(near - from) {
                 chain.bridged = chain.bridged.max(distance);
                 chain.pieces.push(Piece::straight(from, near));

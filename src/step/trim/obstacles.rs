@@ -95,7 +95,7 @@ impl<'o> Obstacles<'o> {
         !self.any_beside(from, to, |_, is_crossed| is_crossed())
     }
 
-    /// Returns the holes, and copies of them, that a way through these places crosses; some may be told more than once.
+    /// Returns the holes, and copies of them, that a way through these places crosses; some may be listed more than once.
     pub(super) fn crossed_by(&self, places: &[Uv]) -> Vec<HoleCopy> {
         let mut crossed = Vec::new();
         for side in places.windows(2) {

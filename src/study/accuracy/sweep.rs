@@ -21,7 +21,7 @@ pub fn accuracy(
 ) -> Accuracy {
     let mut countdown = Countdown::new(progress);
     countdown.stage("the exact spline", None);
-    // Any facets tell the box that rays are shot through.
+    // Any facets give the box that rays are shot through.
     let coarse = mesh_source.mesh(settings.tolerances.first().copied().unwrap_or([0.2, 0.2]));
     let source = Uniform::new(&coarse.mesh.bounds(), settings.seed, settings.rays);
     let rays = source.rays(0..source.len());
@@ -33,7 +33,7 @@ pub fn accuracy(
     let guess = 0.8 * combinations * study.rows.iter().map(|r| r.seconds_trace_median).sum::<f64>();
     let mut ahead = Forecast { tolerances: settings.tolerances.clone(), known: Vec::new(), guess };
     let mut blocks: Vec<(usize, Vec<Row>)> = vec![(0, std::mem::take(&mut study.rows))];
-    // One in the middle, which is quick and tells most of the rest, then the finest, whose facets cost most, then coarse to fine.
+    // One in the middle, which is quick and predicts most of the rest, then the finest, whose facets cost most, then coarse to fine.
     let mut order: Vec<usize> = (0..settings.tolerances.len()).collect();
     order.sort_by(|&a, &b| ahead.log_tolerance(b).total_cmp(&ahead.log_tolerance(a)));
     let first: Vec<usize> = order.get(order.len() / 2).into_iter().chain(order.last()).copied().collect();
@@ -53,7 +53,7 @@ pub fn accuracy(
         blocks.push((k + 1, std::mem::take(&mut study.rows)));
     }
     study.countdown.stage("done", Some(settings.seconds_after));
-    // Rows are told from coarse to fine, whichever came first.
+    // Rows are reported from coarse to fine, whichever came first.
     blocks.sort_by_key(|b| b.0);
     let rows: Vec<Row> = blocks.into_iter().flat_map(|b| b.1).collect();
     let answer = sentence(&rows, 0.05);

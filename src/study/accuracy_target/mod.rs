@@ -2,7 +2,7 @@
 //!
 //! A facet of sag s on a surface of radius R met at incidence i misdirects the mirrored ray by up to 2·(s/R)·tan i with interpolated
 //! normals and 2·acos(1 − s/R) with flat ones. Pilot rays on the spline give radius and incidence on every face, and with them a
-//! tolerance in proportion to the radius, sag ≤ ε·R/(2 tan i). The same rays on such facets then tell how far each face is from what was
+//! tolerance in proportion to the radius, sag ≤ ε·R/(2 tan i). The same rays on such facets then show how far each face is from what was
 //! asked, for facets do not err as much as the formula allows. Fresh rays judge the result against the spline.
 //!
 //! Every kind of normals that could be the cheapest is made to reach what is asked. What is cheapest follows from counted work, never from

@@ -83,7 +83,7 @@ pub fn meet_target_for_light(
     target.check_angle()?;
     let start = Instant::now();
     let clock = Clock::new(progress);
-    // The spline's hits are the truth, and tell which faces matter and how sharply they bend.
+    // The spline's hits are the truth, and decide which faces matter and how sharply they bend.
     clock.report("pilot rays", 0.0);
     let pilots = ReferenceRays::new(mesh_source, (light.rays)(mesh_source.exact(), target.seed, PILOTS));
     let survey = Survey::new(model, &pilots.rays, &pilots.truth);

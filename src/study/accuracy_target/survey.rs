@@ -76,7 +76,7 @@ impl Survey {
         survey
     }
 
-    /// Whether facets of a face have its normals however coarse they are, so that hits on it tell of no error.
+    /// Whether facets of a face have its normals however coarse they are, so that hits on it show no error.
     pub(super) fn is_flat(&self, face: FaceId) -> bool {
         self.flat.get(face.index()).copied().unwrap_or(false)
     }

@@ -35,7 +35,7 @@ impl FaceFacets {
     }
 
     /// Returns the largest sag, mm, of the facets that a ray's line passes within their own sag and `margin`; of all when it passes none,
-    /// as beside a border or over a hole. `sag` tells that of a facet, always the same.
+    /// as beside a border or over a hole. `sag` returns that of a facet, always the same.
     pub(super) fn largest_sag(&self, mesh: &FacetMesh, ray: &Ray, margin: f64, sag: impl Fn(u32) -> f64) -> f64 {
         let line = ray.with_range(f64::NEG_INFINITY, f64::INFINITY);
         let is_passed = |bounds: Aabb, sag: f64| bounds.grown(sag + margin).clip(&line).is_some();
@@ -67,7 +67,7 @@ mod tests {
         let mesh = sample_models::grid_mesh(&sample_models::model("ball", [ball]), 24);
         let mut face = FaceFacets::default();
         (0..mesh.facets.len() as u32).for_each(|i| face.push(i));
-        // Sags of all sizes, so that the wrong facet is told.
+        // Sags of all sizes, so that the wrong facet is recognised.
         let sag = |i: u32| 1e-4 * f64::from(i * 7919 % 1000);
         let (bounds, mut random, mut missed) = (mesh.bounds(), Random::new(3, 0), 0);
         for _ in 0..500 {

@@ -17,7 +17,7 @@ impl PlacedSurface {
         let middle = self.surface.evaluate(uv);
         let looks = |k: &i32| {
             let way = extent * Uv::new(f64::from(k / 3 - 1), f64::from(k % 3 - 1));
-            // Doubled until it is far enough: where the surface is folded its speed tells nothing.
+            // Doubled until it is far enough: where the surface is folded its speed says nothing.
             let step = |n: i32| self.surface.clamp(uv + way * 0.5f64.powi(n));
             let far = |at: &Uv| self.surface.evaluate(*at).distance(middle) >= reach;
             let at = (0..=NEAREST_STEP).rev().map(step).find(far).unwrap_or(step(0));

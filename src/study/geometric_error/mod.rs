@@ -2,11 +2,11 @@
 //!
 //! Random numbers are keyed by ray and bounce, so both runs follow the same paths until the facets turn them away, and most of the
 //! noise cancels in the differences. Each difference comes with its own standard error, from replicate to replicate. Cells that
-//! too few rays reach are judged together with their neighbours, in squares of cells, and the size of the squares is told.
+//! too few rays reach are judged together with their neighbours, in squares of cells, and the size of the squares is reported.
 //!
 //! Guarantee: the same scene, seed and rays give the same bits for any number of threads.
 //! Known weakness: what facets hide from every one of these rays is not seen; the standard error of a difference says how far
-//! rays of this number can tell.
+//! rays of this number can show.
 
 mod cells;
 mod ends;
@@ -124,12 +124,12 @@ impl GeometricError {
     }
 
     /// The error of a power that facets changed on none of these rays: that of one of them, as one in so many may differ. Of a hemisphere
-    /// that reflects all light facets let pass what no such ray met, and the error was told to be none. 0 for facets that are the surface.
+    /// that reflects all light facets let pass what no such ray met, and the error was reported as none. 0 for facets that are the surface.
     pub(in crate::study) fn unseen_power(&self, emitted: f64) -> f64 {
         if self.rays > 0 { emitted / self.rays as f64 } else { 0.0 }
     }
 
-    /// How many of these rays brought a power, of which `emitted` left the sources: of weak rays, as behind a filter, the spread tells it.
+    /// How many of these rays brought a power, of which `emitted` left the sources: of weak rays, as behind a filter, the spread gives it.
     fn rays_of(&self, power: &Paired, statistical: f64, emitted: f64) -> f64 {
         let by_power = power.spline * self.rays as f64 / emitted.max(f64::MIN_POSITIVE);
         let by_spread = if statistical > 0.0 { (power.spline / statistical).powi(2) } else { 0.0 };
@@ -137,7 +137,7 @@ impl GeometricError {
         by_power.max(by_spread.min(self.rays as f64))
     }
 
-    /// Returns a receiver that so few of these rays came to that a run of `scale` times as many will know its light better than they tell
+    /// Returns a receiver that so few of these rays came to that a run of `scale` times as many will know its light better than they show
     /// what facets change of it: one ray in `n` is unseen among `n`, a share of `1/n`, where the run's error is one of `1/√(n·scale)`.
     /// What bodies absorb is no reason for the spline: nobody asked for that, and its error says how little is known.
     pub(in crate::study) fn unjudged(&self, scale: f64, emitted: f64) -> Option<&str> {
@@ -152,7 +152,7 @@ impl GeometricError {
     }
 
     /// Adds to every figure but those of cells what rays may change of it that are too rare to be among these, at a receiver one of those
-    /// that came there: rays without a difference tell of none at all, and yet one more may pass a silhouette.
+    /// that came there: rays without a difference show none at all, and yet one more may pass a silhouette.
     pub fn with_unseen_rays(mut self, emitted: f64) -> Self {
         let shares: Vec<f64> = (0..self.receivers.len()).map(|k| self.unseen_share(k, emitted)).collect();
         for (r, share) in self.receivers.iter_mut().zip(shares) {
@@ -164,7 +164,7 @@ impl GeometricError {
                 place.error = place.error.hypot(share * width.spline);
             }
         }
-        // Of what nobody asked for, as little as of all light; its figures have one ray more where they are told.
+        // Of what nobody asked for, as little as of all light; its figures have one ray more where they are reported.
         let share = 1.0 / self.rays.max(1) as f64;
         self.power.each_mut().into_iter().for_each(|end| end.add_unseen(share));
         self.absorbed.iter_mut().for_each(|a| a.power.add_unseen(share));
@@ -280,7 +280,7 @@ impl ReceiverError {
 mod tests {
     use super::*;
 
-    /// A hundred rays tell of a share of a hundredth at best, which a run of a hundred times as many rays knows as well as by its own; few
+    /// A hundred rays show a share of a hundredth at best, which a run of a hundred times as many rays knows as well as by its own; few
     /// that bring little each are as many as their spread says.
     #[test]
     fn a_receiver_that_few_rays_reach_is_not_judged() {
