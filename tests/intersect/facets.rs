@@ -82,6 +82,8 @@ fn nearest_hit_is_that_of_trying_all_facets() {
         match k % 5 {
             0 => *ray = ray.with_range(4.0, 9.0),
             1 => *ray = Ray::new(ray.origin, [Vector::X, -Vector::Y, Vector::Z][k % 3]),
+            // From before the start on, by less and by more than the size of the mesh.
+            2 => *ray = ray.with_range(-[0.3, 6.0, 300.0][k % 3], 9.0),
             _ => {}
         }
     }
