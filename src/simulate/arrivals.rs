@@ -110,7 +110,7 @@ fn wavelength(bound: &BoundScene, settings: &RunSettings, plan: &Plan, ray: u64)
     let lattice = plan.lattice(replicate);
     let portion = Portion { replicate, source: source as u32, rays: last - first, lattice };
     let mut sampler = RaySampler::new(emitter, settings.seed, settings.sampling, portion, first);
-    // Where it starts is not asked.
+    // Its start does not matter.
     let mut start = Ray::new(Point::ZERO, Vector::Z);
     sampler.single_ray(emitter, (ray - first) as u32, &mut start).1.wavelength
 }

@@ -47,7 +47,7 @@ impl Fnv {
     /// Hashes the number of sums and, with its index, each that is not zero.
     fn absorb_sums(&mut self, sums: &[Sum]) {
         self.absorb(&(sums.len() as u64).to_le_bytes());
-        // Empty cells are most, and are implied by the indices of the others.
+        // Most cells are empty; the indices of the others imply them.
         for (i, s) in sums.iter().enumerate().filter(|(_, s)| **s != Sum::default()) {
             self.absorb(&(i as u64).to_le_bytes());
             self.absorb(&s.total.to_le_bytes());

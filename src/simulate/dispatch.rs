@@ -8,7 +8,7 @@ use super::tallies::ReplicateTally;
 use crate::intersect::Cost;
 
 /// Returns the name of the kernel that a run with these settings uses, from "mirror" to "full". Of one scene, for settings that differ in
-/// `kernel` alone, the same name is the same code; else the smaller kernels have a variant for runs that ask only where rays end.
+/// `kernel` alone, the same name is the same code; else the smaller kernels have a variant for runs that need only the ends of rays.
 pub fn kernel_name(bound: &BoundScene, settings: &RunSettings) -> &'static str {
     kernel_kind(bound, settings).name()
 }
@@ -34,7 +34,7 @@ pub(super) fn trace(
 ) -> Cost {
     use payload::{Clear, Coloured, EndsOnly, Full, Mirror, Nested, Opaque};
     match kind {
-        // The smaller kernels have a variant that asks nothing on the way: the plain scenes that they serve gain
+        // The smaller kernels have a variant that checks nothing on the way: the plain scenes that they serve gain
         // most by it.
         KernelKind::Mirror if context.asks_ends_only() => kernel::trace::<EndsOnly<Mirror>>(context, rays, tally),
         KernelKind::Mirror => kernel::trace::<Mirror>(context, rays, tally),

@@ -26,9 +26,9 @@ const PIECES: usize = 128;
 /// Share of its distance that a rounded box may lie too far away.
 pub(crate) const BOX_ROUNDING: f64 = 1e-9;
 
-/// Boxes around the pieces of a surface: they show at once for most points, also of those within a reflector, that they are far from it.
+/// Boxes around the pieces of a surface: they show at once that most points, also those within a reflector, are far from it.
 ///
-/// As a tree: asked one by one, the boxes of a reflector around a luminous chip took six times as long as all else of its rays.
+/// As a tree: tested one by one, the boxes of a reflector around a luminous chip took six times as long as all else of its rays.
 #[derive(Clone, Debug)]
 pub(crate) struct PieceBoxes {
     tree: BoxTree,
@@ -65,7 +65,7 @@ pub(crate) struct NearestOnFace {
     pub(crate) uv: Uv,
 }
 
-/// Where searches for the nearest point of a trimmed face begin: worked out once for all that is asked of the face.
+/// Where searches for the nearest point of a trimmed face begin: computed once for all queries of the face.
 #[derive(Clone, Debug)]
 pub(crate) struct FaceSamples {
     /// The trims as polygons in parameters.
@@ -96,7 +96,7 @@ impl FaceSamples {
         let is_inside = |uv: Uv| is_inside_polygons(&self.loops, uv);
         // The nearest point is a foot inside the trims or lies on them.
         let border = self.border.iter().map(at).min_by(nearer);
-        // Whether a sample lies inside costs more than its distance: only those nearer than all before are asked.
+        // Whether a sample lies inside costs more than its distance: only those nearer than all before are tested.
         let mut start: Option<NearestOnFace> = None;
         for sample in self.grid.iter().map(at) {
             if start.is_none_or(|nearest| nearer(&sample, &nearest).is_lt()) && is_inside(sample.uv) {
@@ -151,7 +151,7 @@ mod tests {
     use crate::nurbs::sweep;
     use std::f64::consts::{FRAC_PI_2, TAU};
 
-    /// A point is near a sphere of radius 5 as far as its distance from the middle shows; boxes may say that one is near that is not.
+    /// The distance from the centre decides whether a point is near a sphere of radius 5; boxes may call a farther one near.
     #[test]
     fn boxes_hold_all_that_is_near() {
         let boxes = PieceBoxes::new(&sweep::sphere(&Frame::IDENTITY, 5.0, [0.0, TAU], [-FRAC_PI_2, FRAC_PI_2]));

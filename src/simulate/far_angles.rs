@@ -17,7 +17,7 @@ pub(crate) fn to_angles(d: Vector, angles: FarFieldType) -> [f64; 2] {
     match angles {
         FarFieldType::A => [d.x.atan2(d.z), d.y.clamp(-1.0, 1.0).asin()],
         FarFieldType::B => [d.x.clamp(-1.0, 1.0).asin(), d.y.atan2(d.z)],
-        // The cosine of a small angle is 1 to the last digits: its sine keeps it.
+        // The cosine of a small angle is 1 to the last digits: its sine resolves it.
         FarFieldType::C => [d.y.atan2(d.x).rem_euclid(TAU), (d.x * d.x + d.y * d.y).sqrt().atan2(d.z)],
     }
 }

@@ -1,4 +1,4 @@
-//! What a run reports while it runs, and what it hands back.
+//! What a run reports while it runs, and what it returns.
 
 use super::outcome::PathSink;
 use super::partial_run::PartialRun;

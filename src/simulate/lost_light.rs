@@ -7,7 +7,7 @@ use super::surfaces::{FaceOptics, Surface};
 use crate::text::figures;
 use std::collections::BTreeMap;
 
-/// Reasons that are reported.
+/// Most reasons that are reported.
 const TOLD_REASONS: usize = 3;
 /// Largest gap that is not worth a word, mm: what curves in parameters are allowed.
 const NO_GAP_MM: f64 = 1e-6;

@@ -9,7 +9,7 @@ use super::tallies::{ReplicateTally, Tallies};
 pub struct PartialRun {
     /// Replicates of the whole run; of one that grows, as far as is known.
     pub replicates: u32,
-    /// Whether further replicates may follow: parts of it may state different totals.
+    /// Whether further replicates may follow: its parts may report different totals.
     pub grows: bool,
     /// The replicates that are done, rising.
     pub done: Vec<u32>,
@@ -78,8 +78,7 @@ impl PartialRun {
 
 /// Whether tallies have the same receivers, faces and bodies, cell by cell.
 fn same_shape(a: &Tallies, b: &Tallies) -> bool {
-    // The number of cells of each receiver distinguishes scenes; that it is the same scene is shown by the header's
-    // fingerprint.
+    // Cell counts of receivers distinguish scenes; the header's fingerprint confirms that the scene is the same.
     let cells = a.cells.len() == b.cells.len() && a.cells.iter().zip(&b.cells).all(|(a, b)| a.len() == b.len());
     cells
         && a.receivers.len() == b.receivers.len()

@@ -33,10 +33,10 @@ const SUM_OF_SQUARES: f64 = (1u128 << 127) as f64 * 16.0;
 /// beside its rays is below a per cent.
 pub const GROWING_REPLICATE: u64 = 5_000;
 
-/// Fewest replicates of a fixed size for which a run is divided into them unasked.
+/// Fewest replicates of a fixed size for which a run is divided into them by default.
 const FEWEST_GROWING: u64 = 128;
 
-/// Most sources of a run that is divided into replicates of a fixed size without being asked to: 50 rays each in one of these.
+/// Most sources of a run that is divided into replicates of a fixed size by default: 50 rays each in one of these.
 const MOST_SOURCES: usize = 100;
 
 /// How the rays of a run are divided among sources and replicates.
@@ -242,7 +242,7 @@ impl Plan {
 
     /// Returns the source and the replicate of a ray, by its number; `None` when the run has no such ray.
     pub(crate) fn locate(&self, ray: u64) -> Option<(usize, u32)> {
-        // Ranges of sources and replicates follow each other, so that a ray's number gives both.
+        // Ranges of sources and replicates follow each other, so that a ray's number determines both.
         if let Some(size) = self.replicate_rays {
             let replicate = u32::try_from(ray / size).ok().filter(|r| *r < self.replicates)?;
             return Some((self.source_of(ray % size)?, replicate));
@@ -257,7 +257,7 @@ pub(crate) fn can_grow(bound: &BoundScene) -> bool {
     bound.emitters.iter().all(|e| e.rays.is_none())
 }
 
-/// Whether a run is large and round enough to be divided into replicates of a fixed size without being asked to, and its sources few
+/// Whether a run is large and round enough to be divided into replicates of a fixed size by default, and its sources few
 /// enough: each has a ray in every replicate, which of thousands would be several times the rays that were asked for.
 fn grows_unasked(settings: &RunSettings, sources: usize) -> bool {
     let usual = settings.replicates == RunSettings::default().replicates;

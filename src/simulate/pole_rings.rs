@@ -75,7 +75,7 @@ impl PoleRings {
     /// The rings of a grid over the angles of a type, of so many cells along both, between these bounds in degrees; none where planes C do
     /// not go all around, or the cells of types A and B not through half a turn about their poles.
     pub(crate) fn new(angles: FarFieldType, cells: [usize; 2], bounds: [[f64; 2]; 2]) -> Self {
-        // Which angle says how far a direction is from the poles, what it is at the first, and how far the other goes about them at least.
+        // Which angle gives how far a direction is from the poles, what it is at the first, and how far the other goes about them at least.
         let (polar_axis, first_pole_deg, least_turn_deg) = match angles {
             FarFieldType::A => (1, -0.5 * HALF_TURN_DEG, HALF_TURN_DEG),
             FarFieldType::B => (0, -0.5 * HALF_TURN_DEG, HALF_TURN_DEG),

@@ -1,4 +1,4 @@
-//! Receivers in the form the kernel asks: where a ray meets them, and which cell counts it.
+//! Receivers in the form that the kernel needs: where a ray meets them, and which cell counts it.
 
 use super::channels::Channels;
 use super::disc_cells::DiscCells;
@@ -7,13 +7,13 @@ use super::scene::{self, FarFieldType, ReceiverKind};
 use crate::math::{Aabb, Frame, Point, Ray, Vector};
 use std::f64::consts::TAU;
 
-/// Receivers that notes about receivers that are alike name; of more they report the number.
+/// Receivers named in a note about equal ones; beyond them it gives only the number.
 pub(super) const NAMED_RECEIVERS: usize = 3;
 
 /// Share of a flat receiver's half side, and sine of an angle to its plane, below which another surface lies in that plane.
 pub(crate) const FLUSH: f64 = 1e-9;
 
-/// A receiver as the kernel asks it.
+/// A receiver in the form that the kernel needs.
 #[derive(Clone, Debug)]
 pub(crate) struct Receiver {
     pub(crate) name: String,
@@ -275,7 +275,7 @@ impl Receiver {
         }
         let part = |a: f64, i: usize| (2.0 * (a - low[i]) / (high[i] - low[i]) - 1.0).clamp(-1.0, 1.0);
         let at = [part(h, 0), part(v, 1)];
-        // In units of the longer half range, in which distances are given: a degree is as long along both.
+        // In units of the longer half range, in which distances are reported: a degree is as long along both.
         let range = [high[0] - low[0], high[1] - low[1]];
         let longest = range[0].max(range[1]);
         let [x, y] = [at[0] * (range[0] / longest), at[1] * (range[1] / longest)];

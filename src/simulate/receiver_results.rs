@@ -280,7 +280,7 @@ impl ReceiverResult {
 
     /// Returns the rings of cells at and beside the poles, as far as the map reaches them; none of receivers without angles.
     pub(crate) fn pole_rings(&self) -> PoleRings {
-        // A sphere is described by angles of type A.
+        // A sphere is reported in angles of type A.
         let angles = if self.kind == "sphere" { Some(FarFieldType::A) } else { self.angles };
         let Some(angles) = angles else { return PoleRings::default() };
         PoleRings::new(angles, self.grid, [self.bounds(0), self.bounds(1)])
@@ -334,7 +334,7 @@ pub(super) fn unseen_light_notes(receivers: &[ReceiverResult]) -> Vec<String> {
     })
 }
 
-/// Number of rays from which on their own spread says how well a mean place is known.
+/// Number of rays from which on their own spread shows how well a mean place is known.
 const TELLING_RAYS: f64 = 64.0;
 /// Mean square and mean fourth power of the coordinate of a ray that may fall anywhere, in half sides: those of an even distribution.
 const ANYWHERE: [f64; 2] = [1.0 / 3.0, 1.0 / 5.0];

@@ -19,7 +19,7 @@ use super::tally::Sum;
 use crate::intersect::Cost;
 use serde::Serialize;
 
-/// Rates are given in millions.
+/// Rates are reported in millions.
 const MILLION: f64 = 1e6;
 
 /// Results of a simulation.
@@ -161,7 +161,7 @@ impl Results {
         // A run that was stopped early, or is one shard of many, answers for the rays it traced.
         let traced = tallies.ends[0].total as f64 * plan.quantum;
         let quantum = if traced > 0.0 && plan.grows() {
-            // From the sums alone, so that it does not matter which of its parts stated how large the run is.
+            // From the sums alone, so that it does not matter which of its parts gave the size of the run.
             plan.emitted / tallies.ends[0].total as f64
         } else if traced > 0.0 {
             plan.quantum * plan.emitted / traced
@@ -261,7 +261,7 @@ fn few_replicates(replicates: u32) -> Option<String> {
 /// none are left out; [`Absorbed::index`] counts them too.
 fn absorbed_by(bound: &BoundScene, tallies: &Tallies, scale: &PowerScale) -> Vec<Absorbed> {
     let faces = bound.instances.iter().map(|name| (name.as_str(), "faces"));
-    // Media and faces apart: whoever tunes an absorption asks about the one, whoever chooses a paint about the
+    // Media and faces apart: who tunes an absorption needs the one, who chooses a paint the
     // other.
     let bulk = bound.bodies.iter().map(|b| (b.name.as_str(), b.medium.as_str()));
     let result = |(index, ((name, r#in), s)): (usize, ((&str, &str), &Sum))| Absorbed {

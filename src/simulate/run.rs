@@ -80,7 +80,7 @@ pub fn trace(
         kind: kernel_kind(bound, settings),
         hooks,
         start,
-        // Of a shard, its share of the rays: progress is reported of what this run traces.
+        // Of a shard, its share of the rays: progress counts what this run traces.
         total: rays_of_replicates(context.plan.rays, shard.len(), context.plan.replicates),
         next: AtomicUsize::new(0),
         stop: AtomicBool::new(false),

@@ -7,27 +7,27 @@ use super::receiver::{NAMED_RECEIVERS, Receiver, Shape};
 use super::tally::Sum;
 use crate::text::{count_of, figures, first_sentences, grouped};
 
-/// Segments to one meeting of an overlap from which on it is reported. Beside edges where bodies touch rounding may pass for an overlap: in
+/// Segments per meeting of an overlap below which a note reports it. Beside edges where bodies touch rounding may pass for an overlap: in
 /// one scene once in 10^6 segments.
 const OVERLAP_SEGMENTS: u64 = 10_000;
-/// Rays of a source to one that starts in a face and shines into it, from which on that is reported: fewer are those that chance puts
-/// within the glue distance of a face that a source stands across.
+/// Rays of a source per ray that starts in a face and shines into it, below which a note says so: rarer ones start by chance within
+/// the glue distance of a face that a source stands across.
 const FLUSH_RAYS: u64 = 10_000;
 /// Rays of a source below which next to nothing is known of its light.
 const SCARCE_RAYS: u64 = 64;
-/// Power of a ray over that of the mean one above which it is reported that a source has few of them.
+/// Power of a ray over that of the mean one above which a note says that a source has few rays.
 const HEAVY: f64 = 10.0;
 /// Chance that all rays of a source miss a place, below which it is neglected: errors are to hold in 95 % of runs.
 const UNLIKELY: f64 = 0.05;
 /// Draws of each ray of a list, were all of equal power, from which on its own scatter is more than theirs.
 const DRAWN_OFTEN: f64 = 2.0;
-/// Share of a list's light that arrives where what the list leaves open is greatest, for which it is reported.
+/// Share of a list's light that arrives where the list's uncertainty is greatest, for which that uncertainty is reported.
 const MOST_OPEN_SHARE: f64 = 0.5;
-/// Share of a list's rays below which it is reported how many of equal power leave as little open.
+/// Share of a list's rays below which a note says how many of equal power would have the same uncertainty.
 const UNEVEN: f64 = 0.9;
-/// Share of a source's power from which on what rounding changes of it is reported.
+/// Share of a source's power above which the change by rounding is reported.
 const ROUNDED: f64 = 1e-5;
-/// Share of the mean power of a source below which it is reported: among thousands alike each has few rays, and all together enough.
+/// Share of the mean power of a source below which a note reports it: of thousands alike each has few rays, and all together enough.
 const WEAK: f64 = 0.1;
 
 impl BoundScene {
@@ -229,7 +229,7 @@ impl BoundScene {
     }
 }
 
-/// Returns the error that the spread of so many replicates gives for the power of so few rays, as a share of it, though all of them arrive:
+/// Returns the relative error of the power of so few rays by the spread of so many replicates, though all of them arrive:
 /// one replicate has a ray, another none. `None` where each has one, and where none has.
 fn replicate_scatter(rays: u64, replicates: usize) -> Option<f64> {
     let (rays, replicates) = (rays as f64, replicates as f64);

@@ -27,10 +27,10 @@ pub struct MergedSeconds {
     pub parts: u32,
     /// Machines that traced them, by name.
     pub machines: u32,
-    /// Seconds of all threads of all parts; `null` where a system did not report it.
+    /// Seconds of all threads of all parts; `null` where a system did not report them.
     pub cpu: Option<f64>,
     /// Seconds of the slowest part.
     pub slowest: f64,
-    /// Threads of the part that had most; `null` where none records it.
+    /// Threads of the part that had most; `null` where none is known.
     pub threads: Option<u32>,
 }

@@ -120,7 +120,7 @@ impl SequenceSums {
 
     /// Lowers the limit until there are few enough sequences.
     fn make_room(&mut self) {
-        // No more than are held are listed, so that they are seldom counted.
+        // The number held bounds the number reported, so that these are seldom counted.
         while self.limit > 0 && self.sums.len() > MOST_SEQUENCES && self.iter().count() > MOST_SEQUENCES {
             self.lower_limit(self.limit / 2);
         }

@@ -34,7 +34,7 @@ pub struct ReplicateTally {
     pub(crate) paths: Vec<PathVertex>,
     /// What is kept of the paths when all of them are streamed.
     pub(crate) sample: Vec<PathVertex>,
-    /// Where the light of recorded paths was counted, for those who ask.
+    /// Where the light of recorded paths was counted, if requested.
     pub(crate) deposits: Option<Vec<Deposit>>,
     /// Power by sequence, where that is asked for.
     pub(crate) sequences: SequenceTally,
@@ -138,7 +138,7 @@ impl ReplicateTally {
     }
 
     /// Returns the faces that it reached, rising, with the quanta that they absorbed, that entered their body through them and that left
-    /// it; none where the scene does not ask what passes each face.
+    /// it; none where the scene does not request the power through each face.
     pub(crate) fn face_quanta(&self) -> Vec<(u32, [u128; 3])> {
         let Some(crossings) = &self.crossings else { return Vec::new() };
         let grids = [&self.absorbed, &crossings.entered, &crossings.left];

@@ -81,8 +81,8 @@ impl Sum {
         self.squares = self.squares.saturating_add(o.squares);
     }
 
-    /// Returns the standard error of the total, in quanta, from the spread of `replicates` replicates. The total itself of a single one,
-    /// and where the sum of squares is full: both say nothing of the spread.
+    /// Returns the standard error of the total, in quanta, from the spread of `replicates` replicates. The total itself for a single one
+    /// and where the sum of squares is full: neither gives a spread.
     pub fn error(&self, replicates: u32) -> f64 {
         if self.squares == u128::MAX {
             return self.total as f64;
@@ -220,7 +220,7 @@ impl MomentSpread {
     }
 
     /// Returns the standard errors of the two means, then of the two mean squares of [`Moments::means`], as ratios of sums over replicates;
-    /// 1, the half side itself, where a sum is full or there is a single replicate: both say nothing of the spread.
+    /// 1, the half side itself, where a sum is full or there is a single replicate: neither gives a spread.
     pub fn errors(&self, power: &Sum, m: &Moments, replicates: u32) -> [f64; 4] {
         let total = power.total.max(1) as f64;
         let unit = [f64::from(1u32 << CUT), 2f64.powi(CUT_MOMENT as i32) / GRAIN];

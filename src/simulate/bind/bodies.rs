@@ -96,7 +96,7 @@ pub(super) fn set_trapped_lengths(scene: &Scene, bodies: &mut [Body], pairs: &[[
             united[a.max(b) as usize] = a.min(b);
         }
     }
-    // A path does not know where one body of its index ends and the next begins: what counts is the way through all of them.
+    // A path does not show where one body of its index ends and the next begins: what counts is the way through all of them.
     let mut whole = vec![(Aabb::EMPTY, false); bodies.len()];
     let of_body: Vec<usize> = (0..bodies.len() as u32).map(|k| group_of(&mut united, k) as usize).collect();
     for (body, &k) in bodies.iter().zip(&of_body).skip(1) {

@@ -40,7 +40,7 @@ pub struct BoundScene {
     pub(crate) receivers: Vec<Receiver>,
     /// Around all faces and the places of the sources, with room to spare.
     pub(crate) region: Aabb,
-    /// Boxes around bodies and faces of opaque solids, which find the sources that lie clear of them; `None` where these are few.
+    /// Boxes around bodies and faces of opaque solids, which show the sources that lie clear of them; `None` where these are few.
     pub(crate) solids: Option<BoxTree>,
     /// Names of the instances, and the instance of each face.
     pub(crate) instances: Vec<String>,

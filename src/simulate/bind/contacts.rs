@@ -31,8 +31,8 @@ pub(super) fn touching_bodies(scene: &Scene, model: &Model, of_face: &[u32]) -> 
     (touching, pairs)
 }
 
-/// Marks the faces whose box comes within the glue distance of the box of a face of another shell of the same body. Boxes alone are asked:
-/// whether the shells touch is found where light crosses there.
+/// Marks the faces whose box comes within the glue distance of the box of a face of another shell of the same body. Only boxes are tested:
+/// whether the shells touch is decided where light crosses there.
 pub(super) fn touching_siblings(scene: &Scene, model: &Model, of_face: &[u32]) -> Vec<bool> {
     let mut siblings = vec![false; of_face.len()];
     let mut faces: Vec<PlacedFace<'_>> = (model.placed_faces())
@@ -44,7 +44,7 @@ pub(super) fn touching_siblings(scene: &Scene, model: &Model, of_face: &[u32]) -
         let boxes: Vec<Aabb> = body.iter().map(|f| f.bounds().grown(0.5 * scene.run.glue_distance())).collect();
         for meeting in BoxTree::meeting_pairs(&boxes) {
             let [a, b] = meeting.map(|k| &body[k]);
-            // By boxes alone: whether the shells really touch at a point is asked where light crosses there.
+            // By boxes alone: whether the shells really touch at a point is tested where light crosses there.
             if a.shell != b.shell {
                 (siblings[a.id.index()], siblings[b.id.index()]) = (true, true);
             }
@@ -59,8 +59,8 @@ const MOST_DISTANCES: usize = 50_000;
 const SAMPLES: usize = 5;
 
 /// Marks faces of bodies, and opaque faces without a medium (`opaque`), that lie on each other: both are flat, in one plane, and their
-/// boxes meet, or a sample point of one is within the glue distance of the other. After [`MOST_DISTANCES`] questions, faces whose boxes
-/// meet are marked unasked. All `false` where either is missing.
+/// boxes meet, or a sample point of one is within the glue distance of the other. After [`MOST_DISTANCES`] distances, faces whose boxes
+/// meet are marked without a check. All `false` where either is missing.
 pub(super) fn media_on_opaque(scene: &Scene, model: &Model, of_face: &[u32], opaque: &[bool]) -> Vec<bool> {
     let mut on_opaque = vec![false; of_face.len()];
     // Nothing to find: no bodies, or nothing opaque.
@@ -75,7 +75,7 @@ pub(super) fn media_on_opaque(scene: &Scene, model: &Model, of_face: &[u32], opa
         .filter(|f| of_face[f.id.index()] != AMBIENT || opaque[f.id.index()])
         .map(|f| (f.id.index(), box_of(f)))
         .collect();
-    // By their lower x: the order of the pairs decides which of them are marked unasked.
+    // By their lower x: the order of the pairs decides which of them are marked without a check.
     faces.sort_by(|a, b| a.1.min.x.total_cmp(&b.1.min.x));
     let (faces, boxes): (Vec<usize>, Vec<Aabb>) = faces.into_iter().unzip();
     let mut nearest = Nearest::new(model);

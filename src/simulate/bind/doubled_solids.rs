@@ -13,7 +13,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 /// Cells that places are rounded to, mm: more than the rounding of a file's coordinates, and less than any distance that is meant.
 const CELL_MM: f64 = 1e-6;
 
-/// Pairs of solids that are named; of more the number is reported.
+/// Pairs of solids that are named; beyond them only the number is given.
 const NAMED_PAIRS: usize = 3;
 
 /// A solid: its instance, and its number in the part.

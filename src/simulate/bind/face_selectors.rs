@@ -71,7 +71,7 @@ fn selector_of_keys(keys: &[Key], face: &PlacedFace<'_>, names: &Names<'_>) -> O
 }
 
 /// Returns for each of these faces the shortest selector that means it alone among them: its name or `#id`, with part, instance and solid
-/// where these are needed. Where no combination distinguishes it, all that it has with a point on it; a face without geometry has no point.
+/// where these are needed. Where no combination identifies it, all that it has with a point on it; a face without geometry has no point.
 pub fn face_selectors(model: &Model, faces: &[PlacedFace<'_>]) -> Vec<FaceSelector> {
     let names = Names::new(model);
     let mut chosen: Vec<Option<FaceSelector>> = vec![None; faces.len()];
@@ -79,7 +79,7 @@ pub fn face_selectors(model: &Model, faces: &[PlacedFace<'_>]) -> Vec<FaceSelect
         if chosen.iter().all(Option::is_some) {
             break;
         }
-        // A selector distinguishes a face when no other face of these has the same text.
+        // A selector identifies a face when no other face of these has the same text.
         let selectors: Vec<Option<FaceSelector>> =
             faces.iter().map(|f| selector_of_keys(keys, f, &names)).collect();
         let texts: Vec<Option<String>> = selectors.iter().map(|s| Some(s.as_ref()?.to_string())).collect();

@@ -11,7 +11,7 @@ use crate::text::{count_of, figures, first_sentences};
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
-/// Share of the named area from which on it is reported that it is covered: a sample of a thousand on one of a few faces.
+/// Share of the named area from which on a note says that it is covered: a sample of a thousand on one of a few faces.
 const TOLD_SHARE: f64 = 1e-3;
 
 /// Sentences about luminous faces, by what they say.
@@ -113,7 +113,7 @@ impl<'m> LuminousSearch<'m> {
         Ok(Some(area))
     }
 
-    /// Returns what is to be reported of the faces that were found: of each kind the first sentences, and one that counts the others.
+    /// Returns the notes on the faces that were found: of each kind the first sentences, and one that counts the others.
     pub(super) fn into_notes(self) -> Vec<String> {
         let LuminousNotes { even, dark, covered } = self.notes;
         let kinds = [

@@ -16,7 +16,7 @@ pub(super) const BARE_INTERFACE: u16 = 1;
 pub(super) struct SurfaceTable<'s> {
     scene: &'s Scene,
     surfaces: Vec<Surface>,
-    /// The index of each rule's surface, and last of `default_surface`; `None` where no face has asked: the values of a rule that decides
+    /// The index of each rule's surface, and last of `default_surface`; `None` where no face needed it: the values of a rule that decides
     /// no face need not go together.
     of_rules: Vec<Option<u16>>,
 }

@@ -40,7 +40,7 @@ use select::FaceSearch;
 /// What the box of a scene is grown by, as a share of its diagonal: room for what facets and rounding put outside the splines' boxes.
 const REGION_MARGIN: f64 = 1e-3;
 
-/// Sources from which on boxes decide which of them lie clear of all solids: of fewer some rays are asked in less time.
+/// Sources from which on boxes decide which of them lie clear of all solids: for fewer, probing some rays takes less time.
 const MANY_SOURCES: usize = 64;
 
 impl Scene {

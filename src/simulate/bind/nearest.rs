@@ -10,7 +10,7 @@ use crate::simulate::trim_loops::trim_polygons;
 /// their index in the model; points and distances are in scene coordinates, mm.
 ///
 /// Exact for points on a face; between faces, good to the spacing of the samples (1/24 of a face) where the foot of the perpendicular lies
-/// outside a trimming loop. What a face is searched with is worked out when it is first asked, and kept.
+/// outside a trimming loop. The search data of a face are computed at its first query and kept.
 pub(super) struct Nearest<'a> {
     faces: Vec<PlacedFace<'a>>,
     bounds: Vec<Aabb>,
@@ -96,11 +96,11 @@ impl<'a> Nearest<'a> {
         if let Some(face) = placed.face {
             let slab = self.slabs[index].get_or_insert_with(|| Slab::new(&face.surface));
             let local = placed.placement.local_point(p);
-            // Two planes cost a hundredth of the search for the foot, and find most points that are far.
+            // Two planes cost a hundredth of the search for the foot, and rule out most points that are far.
             if slab.distance_below(local) * placed.placement.scale > limit {
                 return false;
             }
-            // Within a reflector planes say nothing; what lies in no box around a piece is far from all of them.
+            // Within a reflector planes rule out nothing; what lies in no box around a piece is far from all of them.
             let pieces = self.pieces[index].get_or_insert_with(|| PieceBoxes::new(&face.surface));
             if !pieces.are_within(local, limit / placed.placement.scale) {
                 return false;

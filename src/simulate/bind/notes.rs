@@ -15,10 +15,10 @@ use crate::text::{count_of, first_sentences};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Share of a wavelength that the end of a table may be missed by: single precision rounds by half of 2⁻²³, a change of units by less, and
-/// what is beyond can be distinguished by the digits that are written.
+/// larger differences show in the digits that are written.
 const ROUNDING: f64 = 5e-7;
 
-/// Tables, media, sources and remarks on files that are named; of more the number is reported.
+/// Tables, media, sources and remarks on files that are named; beyond them only the number is given.
 pub(super) const NAMED: usize = 8;
 
 /// Index beyond which the surroundings are no gas: vapours at normal pressure have up to 1.0018 (benzene).
@@ -220,7 +220,7 @@ pub(super) fn opening_note(bound: &BoundScene, model: &Model) -> Option<String> 
         (name, Some(entity)) => format!(" (face '{name}', #{entity})"),
         (name, None) => format!(" (face '{name}')"),
     };
-    // The ways of its rays out of the scene differ where they pass the opening, so that none stands for the others.
+    // The ways of its rays out of the scene give different answers where they pass the opening, so that none stands for the others.
     let within = |k: usize| {
         let e = &bound.emitters[k];
         let reaches = |&body: &u32| !bound.bodies[body as usize].bounds.intersection(e.extent()).is_empty();
@@ -331,7 +331,7 @@ pub(super) fn ready_mesh_note(model: &Model) -> Option<String> {
 const GLUE_OF_THICKNESS: f64 = 0.1;
 
 /// Returns one sentence about the thinnest body that touches others and whose box is thinner than twice the glue distance along an axis;
-/// `None` where there is none. A flat sheet is none: it has no thickness that a smaller glue distance could separate.
+/// `None` where there is none. A flat sheet is none: it has no thickness that a smaller glue distance could resolve.
 pub(super) fn thin_body_note(bound: &BoundScene) -> Option<String> {
     let glue = bound.scene.run.glue_mm;
     let thickness = |k: u32| bound.bodies[k as usize].bounds.size().min_element();

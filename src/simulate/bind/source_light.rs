@@ -61,7 +61,7 @@ fn probes(spectrum: &Wavelengths) -> Vec<f64> {
 }
 
 /// Checks that every medium in use, the surroundings too, has an index from 0.1 to 10 at every wavelength of the sources; a continuous
-/// spectrum is asked at 65 places, in even steps of power, and one that cannot be read is passed over.
+/// spectrum is sampled at 65 places, in even steps of power, and one that cannot be read is passed over.
 ///
 /// # Errors
 /// For the first wavelength and medium that fail, at the source.
@@ -81,7 +81,7 @@ pub(super) fn check_indices(scene: &Scene, loaded: &[Option<Loaded>], bodies: &[
         };
         wavelengths.sort_by(f64::total_cmp);
         wavelengths.dedup();
-        // A dispersion formula may fail in the middle of a spectrum, so that its ends do not show it.
+        // A dispersion formula may fail in the middle of a spectrum, so that its ends do not suffice.
         for nm in wavelengths {
             let wrong = bodies.iter().find(|b| !Index::RANGE.contains(&b.index(Some(nm))));
             if let Some(body) = wrong {

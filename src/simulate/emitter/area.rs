@@ -91,7 +91,7 @@ impl LuminousFace {
         (self.placement.point(self.face.surface.evaluate(uv)), self.placement.normal(outward).normalize())
     }
 
-    /// Whether no opaque face lies against a point of it, given in spline parameters; trims are not asked.
+    /// Whether no opaque face lies against a point of it, given in spline parameters; trims are not checked.
     fn is_free(&self, uv: Uv) -> bool {
         let (point, normal) = self.point_and_normal(uv);
         !self.covers.iter().any(|cover| cover.covers(point, normal))

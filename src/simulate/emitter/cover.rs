@@ -24,7 +24,7 @@ pub(crate) struct Cover {
 /// The trims of a face, as what looks for a foot on it needs them.
 #[derive(Clone, Debug)]
 enum Trims {
-    /// Of a face of first degree, where only insides are asked: bands answer that by a few sides, polygons by all.
+    /// Of a face of first degree, which needs only inside tests: bands check a few sides for them, polygons all.
     Plane(TrimRegion),
     /// Of any other, with boxes around its pieces: the box around a reflector holds its lamp, which would else have a foot looked for at
     /// each ray.

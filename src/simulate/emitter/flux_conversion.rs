@@ -82,7 +82,7 @@ pub(super) fn conversion(
         };
         return Ok(Some((conversion, format!("its {from} were made {to}, each ray by its wavelength"))));
     }
-    // Nothing says how bright the light of a watt is; the scene's own power makes that a matter of proportion.
+    // The brightness of a watt of this light is unknown; the scene's own power makes that a matter of proportion.
     if source.power.is_some() {
         return Ok(None);
     }

@@ -5,7 +5,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 /// Wavelengths that are kept apart; of more, one in each [`CELL_BITS`]-bit cell is.
 const MOST_EXACT: usize = 1 << 16;
 
-/// Bits of a wavelength's exponent and mantissa that select its cell: 4,096 cells to an octave, 0.13 nm at 550 nm, which is finer than any
+/// Bits of a wavelength's exponent and mantissa that give its cell: 4,096 cells to an octave, 0.13 nm at 550 nm, which is finer than any
 /// index changes.
 const CELL_BITS: u32 = 12 + 12;
 

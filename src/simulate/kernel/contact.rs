@@ -124,7 +124,7 @@ fn probe_at(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Ray {
 /// Goes through the faces that a short ray meets, in order, at most [`MOST_COINCIDENT_FACES`] of them; ends at a face that the scene does
 /// not know.
 ///
-/// An intersector may give a root once more, moved up to where it is asked from by rounding; it is asked from a little farther on then.
+/// An intersector may return a root again, moved by rounding to the query's start; the next query then starts a little farther on.
 /// Without that, light that was reflected beside an edge of a touching body was lost on the spline: the face that stands across came six
 /// times, and the partner behind it not at all.
 pub(super) fn faces_along<'a>(
@@ -200,7 +200,7 @@ impl LeftContact {
 /// Nor past a face that stands across, as beside an edge: 4 % of what is trapped in eight touching bricks got out between their faces in
 /// 200 times their length.
 ///
-/// What has been passed is passed by its rounding, as the spline gives a root once more where it is asked from next to it: light that was
+/// What has been passed is passed by its rounding, as the spline returns a root again for a query that starts next to it: light that was
 /// reflected within the glue distance of an edge met the second face there, and 9 % of that in a square die was lost.
 #[inline(never)]
 pub(super) fn end_of_contact(
@@ -273,7 +273,7 @@ pub(super) enum ContactSurface {
 pub(super) fn contact_surface(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> ContactSurface {
     let counts = |other: &FaceOptics| touches_other(&at.face, other) || may_be_siblings(&at.face, other);
     let Some(partner) = touching_face(context, ray, at, counts) else { return ContactSurface::Bare };
-    // Bare: what happens follows from the two media alone, and is the same from whichever face.
+    // Bare: what happens follows from the two media alone, and is the same from either face.
     let is_bare = |f: &FaceOptics| context.bound.surfaces[f.surface as usize] == Surface::Interface;
     let entering = ray.direction.dot(at.hit.geometric_normal) < 0.0;
     match [is_bare(&at.face), is_bare(&partner.face)] {

@@ -19,7 +19,7 @@ pub(super) type Bodies = SmallVec<[u32; 4]>;
 pub(super) enum StartingMedia {
     /// All in the same bodies.
     Same(Bodies),
-    /// Each must be asked: the source lies on a surface, or reaches into a body.
+    /// Each must be probed: the source lies on a surface, or reaches into a body.
     PerRay,
     /// The same, and the source may lie on a face of a solid, which its rays must start clear of.
     OnFace,
@@ -59,7 +59,7 @@ impl<'a> Context<'a> {
         intersector: &'a dyn Intersector,
         settings: &'a RunSettings,
     ) -> Self {
-        // Receivers are sorted once by how a segment must ask them, so that the hot loop walks four short lists and tests no kind.
+        // Receivers are sorted once by how a segment is tested against them, so that the hot loop walks four short lists and tests no kind.
         let all = &bound.receivers[..];
         // A far field counts directions; it cuts no segment.
         let far = |&i: &usize| matches!(all[i].shape, Shape::FarField { .. });
@@ -94,7 +94,7 @@ impl<'a> Context<'a> {
         Self { paths: None, ..self }
     }
 
-    /// Whether only where rays end is asked: no path is recorded, no face is tallied, and no receiver lets light pass, selects by
+    /// Whether only the ends of rays are needed: no path is recorded, no face is tallied, and no receiver lets light pass, selects by
     /// interactions or has channels.
     pub(crate) fn asks_ends_only(&self) -> bool {
         let extra = |r: &Receiver| r.interactions.is_some() || r.channels.count() > 0;

@@ -148,7 +148,7 @@ impl SourceQueue {
         mixed.clear();
         while self.mixes && !mixed.is_full() && self.source < self.last {
             let emitter = &context.bound.emitters[self.source];
-            // Its rays start out of turn, so that no pattern lets the processor predict what is read next.
+            // Its rays start out of turn, so that no pattern lets the processor prefetch.
             prefetch(&context.bound.emitters, self.source + AHEAD);
             mixed.add(emitter, self.portion(context), (self.range[0], self.quanta), &mut self.next);
             if self.next >= self.range[1] {

@@ -27,13 +27,13 @@ const LONGEST_LOOK: f64 = 1.0;
 /// that agree decide, or the first where none do.
 pub(super) fn media_at(context: &Context<'_>, ray: &Ray) -> Bodies {
     let mut bodies = media_on_way_out(context, ray);
-    // A way that comes in by the opening of a body and leaves by a face would imply that it began there. Sources beside such a body were
-    // asked ray by ray for that.
+    // A way that comes in by the opening of a body and leaves by a face would suggest that it began there. Sources beside such a body were
+    // probed ray by ray for that.
     bodies.retain(|&mut body| is_within_box(context, body, ray.origin));
     bodies
 }
 
-/// Whether a point, mm, lies in the box around a body, as far as rounding and faces that touch allow.
+/// Whether a point, mm, lies in the box around a body, to within rounding and the glue distance.
 fn is_within_box(context: &Context<'_>, body: u32, point: Point) -> bool {
     context.bound.bodies[body as usize].bounds.grown(context.glue_mm() + rounding_at(point)).contains(point)
 }
@@ -181,7 +181,7 @@ pub(super) fn has_left_by_opening<C: RayPayload>(
 ) -> bool {
     let body = payload.body();
     let open = context.bound.bodies[body as usize].open;
-    // Out of its box nothing has to be asked.
+    // Outside its box no check is needed.
     open && (!is_within_box(context, body, point)
         || !media_at(context, &Ray::new(point, ray.direction)).contains(&body))
 }
@@ -200,7 +200,7 @@ struct PassedFace {
 struct PassedFaces(SmallVec<[PassedFace; 8]>);
 
 impl PassedFaces {
-    /// Whether a face was passed there, as far as rounding, mm, allows. The last are asked, for only those may be as near.
+    /// Whether a face was passed there, to within `rounding`, mm. Only the last faces are checked: no others can be as near.
     fn contains(&self, other: &PassedFace, rounding: f64) -> bool {
         self.0.iter().rev().take(MOST_COINCIDENT_FACES).any(|passed| {
             passed.face == other.face

@@ -13,7 +13,7 @@ pub(crate) trait RayPayload: Copy + Send {
     const MEDIA: bool;
     /// Whether faces may do more than absorb or reflect a constant share.
     const COATED: bool = true;
-    /// Whether only where rays end is asked: no path is recorded, no face is tallied, and no receiver lets light pass, selects by
+    /// Whether only the ends of rays are needed: no path is recorded, no face is tallied, and no receiver lets light pass, selects by
     /// interactions or has channels.
     const ENDS_ONLY: bool = false;
     /// Whether it carries a wavelength.
@@ -80,7 +80,7 @@ impl<const COATED: bool> RayPayload for NoMedia<COATED> {
     }
 }
 
-/// The payload `C` of a run that asks of each ray nothing but where it ends.
+/// The payload `C` of a run that needs only the ends of its rays.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EndsOnly<C>(C);
 

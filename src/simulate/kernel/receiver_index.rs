@@ -1,7 +1,7 @@
 //! The receivers that a ray may meet: all of them where they are few, those whose boxes it meets, by a tree of boxes, where they are
 //! many.
 //!
-//! Guarantee: whoever asks goes through them in the order of the scene, and leaves out none that the ray crosses; so a tally has the
+//! Guarantee: a query visits them in the order of the scene and leaves out none that the ray crosses; so a tally has the
 //! same bits with and without the tree.
 
 use crate::math::simd::{self, Instructions, Kernel};
@@ -9,13 +9,13 @@ use crate::math::{Aabb, BoxTree, Ray};
 use crate::simulate::receiver::Receiver;
 use smallvec::SmallVec;
 
-/// Up to so many receivers asking each costs less than a tree.
+/// Up to so many receivers, testing each costs less than a tree.
 const FEW: usize = 8;
 
 /// Receivers, by index.
 pub(super) type Candidates = SmallVec<[u32; 16]>;
 
-/// Receivers of one kind, to be asked by rays.
+/// Receivers of one kind, queried by rays.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ReceiverIndex {
     /// Their indices, in the order of the scene.

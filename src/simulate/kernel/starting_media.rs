@@ -16,7 +16,7 @@ use crate::simulate::plan::Plan;
 use crate::simulate::settings::RunSettings;
 use crate::simulate::surfaces::{FaceOptics, Surface};
 
-/// Rays of a source that are asked before it is believed that all start in the same bodies.
+/// Rays of a source that are probed before all are taken to start in the same bodies.
 const PROBED_RAYS: u64 = 64;
 
 impl<'a> Context<'a> {
@@ -31,7 +31,7 @@ impl<'a> Context<'a> {
     }
 }
 
-/// Whether all rays of a source start clear of every body and every opaque solid, so that none need be asked; not known where the scene
+/// Whether all rays of a source start clear of every body and every opaque solid, so that none needs a probe; not known where the scene
 /// has few sources.
 fn starts_clear(context: &Context<'_>, emitter: &Emitter) -> bool {
     let (Some(solids), Some(starts)) = (&context.bound.solids, emitter.starts()) else { return false };
@@ -63,11 +63,11 @@ fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter, has_m
     let mut asked: Option<[u32; 2]> = None;
     for k in 0..PROBED_RAYS {
         // Over all replicates and the whole of each: they are spread over the whole of a ray list. As many where replicates are few, of
-        // which each has several then: two rays would say nothing of a source that straddles a boundary.
+        // which each has several then: two rays would miss a source that straddles a boundary.
         let replicate = (k * u64::from(replicates) / PROBED_RAYS) as u32;
         let Some((replicate, [from, to])) = replicate_with_rays(&context.plan, source, replicate) else { continue };
         let index = ((to - from) * k / PROBED_RAYS) as u32;
-        // One ray of few is asked once.
+        // Where rays are few, each is probed once.
         if asked.replace([replicate, index]) == Some([replicate, index]) {
             continue;
         }
@@ -81,7 +81,7 @@ fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter, has_m
         }
         let Some(sampler) = &mut sampler else { continue };
         let (_, emission) = sampler.single_ray(emitter, index, &mut ray);
-        // One start on a face decides for all: the rays of such a source must each be asked. Luminous faces find their own start.
+        // One start on a face decides for all: each ray of such a source must be probed. Luminous faces find their own start.
         if emission.from.is_none() && emitter.media_stated && has_media {
             // What starts clear of all faces, on the stated side, is left as it is.
             if start_in_stated_media(context, &emitter.inside, &ray) != ray {
@@ -121,7 +121,7 @@ fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter, has_m
 }
 
 /// Returns the first replicate, from this one on, that has rays of a source, and the numbers of the first of them and past the last; `None`
-/// where none has. A source of fewer rays than replicates is in some alone, which may be none of those that are asked.
+/// where none has. A source of fewer rays than replicates is in some alone, which may be none of those that are probed.
 fn replicate_with_rays(plan: &Plan, source: usize, replicate: u32) -> Option<(u32, [u64; 2])> {
     let [from, to] = plan.range(source, replicate);
     if from < to {

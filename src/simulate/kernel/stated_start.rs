@@ -1,4 +1,4 @@
-//! Where the rays of a source begin that lies near faces, and of which the scene says what it is inside of: on the side of each face on
+//! Where rays begin whose source lies near faces and whose scene states what it is inside of: on the side of each face on
 //! which that is true, whichever side the source was drawn on, or rounding puts it. Where it is true on both sides of a thin body, on the
 //! nearer one.
 //!

@@ -118,7 +118,7 @@ fn overlapping_bodies<C: RayPayload>(
 ) -> Option<[u32; 2]> {
     let here = payload.body();
     let left = at.face.body;
-    // At a contact one body lies below the other on the stack by design; only a crossing away from one means an overlap.
+    // At a contact one body lies below the other on the stack by design; only a crossing away from one shows an overlap.
     let below = !at.entering && left != here && at.skip == 0.0;
     (below && context.index(left, payload) != context.index(here, payload))
         .then(|| [left.min(here), left.max(here)])

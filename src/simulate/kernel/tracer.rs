@@ -28,7 +28,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     /// Adds a vertex to the tally if the path of this ray is recorded; `face` is `None` where it is at none.
     #[inline(always)]
     pub(super) fn record(&mut self, path: &Path<C>, point: Point, event: Event, face: Option<FaceId>) {
-        // Only sampled paths are recorded, and asking costs next to nothing.
+        // Only sampled paths are recorded, and the check costs next to nothing.
         if !C::ENDS_ONLY && self.context.plan.records(path.ray) {
             let Path { ray, branch, bounce, .. } = *path;
             let (power, face) = (path.quanta / self.context.plan.average_ray, face.map(|f| f.0));

@@ -87,7 +87,7 @@ fn open_ranges() -> [(&'static str, &'static str, Value); 13] {
     let rays = json!({"minimum": 1, "maximum": MOST_RAYS});
     let least = json!({"minimum": LEAST_TOLERANCE_MM});
     [
-        // Each bound is asked of the form that it fits.
+        // Each bound is checked on the form that it fits.
         ("Accuracy", "tolerance_mm", json!({"minimum": LEAST_TOLERANCE_MM, "items": least})),
         ("Run", "rays", rays.clone()),
         ("Run", "max_length_mm", positive.clone()),

@@ -159,7 +159,7 @@ fn type_error(message: &str, key: &str) -> Error {
         let error = Error::new(ErrorKind::Syntax, format!("{given} in a list where {wanted} values belong"));
         return if key.is_empty() { error } else { error.help(list_help(key, wanted)) };
     }
-    // The key is asked first: a list has its own form, which the type does not show.
+    // The key is checked first: a list has its own form, which the type does not show.
     if let Some((_, help)) = LISTS.iter().find(|(list, _)| *list == key) {
         let message = plain_types(message).replace("a sequence", "a list").replace("an array", "a list");
         return Error::new(ErrorKind::Syntax, message).help(*help);

@@ -195,7 +195,7 @@ impl Scene {
 
     /// Checks all values, in the order of the file's keys, and that the receivers' cells fit into memory.
     fn check(&self) -> Result<(), Error> {
-        // In the order of the file's keys, so that the first fault reported is one that stands far up.
+        // In the order of the file's keys, so that the first fault reported is one near the top.
         let origin = &self.origin;
         self.run.check(origin)?;
         self.accuracy.check(origin)?;

@@ -25,7 +25,7 @@ const GLUE_MM: f64 = 1e-3;
 /// Glue distances that may be asked for, mm: from the rounding of places to what would close real gaps.
 const GLUES_MM: std::ops::RangeInclusive<f64> = 1e-9..=1.0;
 
-/// Share by which the glue distance reaches beyond what is asked, far more than places are rounded by: faces that are drawn exactly so far
+/// Share by which the glue distance reaches beyond the given one, far more than places are rounded by: faces that are drawn exactly so far
 /// apart are one for every ray then, and not for those alone that rounding puts nearer.
 const GLUE_MARGIN: f64 = 1e-6;
 

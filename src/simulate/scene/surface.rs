@@ -55,7 +55,7 @@ impl Material {
         let mirror = matches!(kind, SurfaceOptics::Mirror | SurfaceOptics::Diffuse);
         let coated = kind == SurfaceOptics::Coating;
         let scatters = !matches!(kind, SurfaceOptics::Diffuse | SurfaceOptics::Absorber);
-        // One table for all kinds: a key that is not asked about here would be ignored in silence.
+        // One table for all kinds: a key that is not checked here would be ignored in silence.
         let keys = [
             ("reflectance", self.reflectance.is_some(), mirror || coated, "`surface` mirror, diffuse or coating"),
             ("transmittance", self.transmittance.is_some(), coated, "`surface = \"coating\"`"),
