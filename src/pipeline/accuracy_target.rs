@@ -18,7 +18,7 @@ const RAY_LIFT_MM: f64 = 1.0;
 /// Where a ray starts that left a surface, as a share of its way to the next: in the middle, in free space whatever the facets. On its own
 /// line: lifted off the wall of a light guide by a tenth of that way it met the next wall less flat, and 0.42° were claimed for 0.51°.
 const STARTING_SHARE: f64 = 0.5;
-/// Rays that show how many segments a path has.
+/// Rays by which the number of segments of a path is estimated.
 const PROBED_RAYS: u64 = 64;
 /// Segments that are traced for each that is wanted, where paths are long: enough that those taken are of many paths.
 const SEGMENTS_A_WANTED_RAY: f64 = 16.0;

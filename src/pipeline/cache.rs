@@ -24,8 +24,7 @@ use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-/// The program, by version and commit, and by its sources where no commit identifies them: only what the same one made is kept and added
-/// up.
+/// The program, by version and commit, by its sources where no commit is known: only results of the same program are kept and added up.
 pub const PROGRAM: &str = concat!(env!("CARGO_PKG_VERSION"), " ", env!("LAMPYRIS_BUILD"));
 /// First bytes of an entry.
 const MAGIC: &[u8] = b"lampyris cache 5\n";
@@ -156,7 +155,7 @@ impl Cache {
             // Another process may just have removed it.
             let Ok(metadata) = entry.metadata() else { continue };
             if metadata.is_file() {
-                // A time that is not known counts as the oldest.
+                // An unknown time counts as the oldest.
                 let used = metadata.modified().unwrap_or(SystemTime::UNIX_EPOCH);
                 files.push(CacheEntry { file: entry.path(), bytes: metadata.len(), used });
             }
@@ -190,7 +189,7 @@ impl Cache {
         }
     }
 
-    /// Writes an entry and removes what is too much; a failure is only reported to the monitor.
+    /// Writes an entry and removes entries beyond the limit; a failure is only reported to the monitor.
     pub(super) fn keep(
         &self,
         name: &str,
@@ -249,7 +248,7 @@ impl CachedFacets<'_> {
         self.cache.fetch(&self.name(FACETS), self.monitor, read)
     }
 
-    /// Returns what `fetch` reads where these facets are kept; where another process is making them, waits until it ends and asks `fetch`
+    /// Returns what `fetch` reads where these facets are kept; where another process is making them, waits until it ends and calls `fetch`
     /// again. An `Err` is the turn: the caller makes them while it holds it.
     pub(super) fn mesh_or_turn<T>(&self, fetch: impl Fn() -> Option<T>) -> Result<T, Turn> {
         self.cache.fetch_or_turn(&self.name(FACETS), fetch)
@@ -285,7 +284,7 @@ fn choice_name(run: &Fingerprint) -> String {
 }
 
 /// Hashes all that decides facets and octree but the octree's settings, of which the arrays hold none that is not the program's default;
-/// the bytes of the models' files among it, as `reports` lists them.
+/// the bytes of the models' files among it, as `reports` gives them.
 pub(super) fn facets_key(scene: &Scene, reports: &[ImportReport], mesher: &tessellate::Settings) -> Fingerprint {
     // Entries are raw bytes of numbers: machines of the other order must not share them.
     let machine = if cfg!(target_endian = "big") { "big" } else { "little" };

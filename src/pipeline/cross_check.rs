@@ -1,4 +1,4 @@
-//! What is found out about a run beside its results: a sample of its rays asked again of BVH and spline, and what the facets
+//! The checks of a run beside its results: a sample of its rays traced again on BVH and spline, and what the facets
 //! change of its light.
 
 use super::intersectors::{groups_in_one_scene, octrees_in_one_scene, true_intersector};
@@ -16,9 +16,9 @@ use crate::study::geometric_error::{GeometricError, geometric_error};
 use crate::study::{Lift, Progress};
 use std::time::Instant;
 
-/// Segments of a run that are asked again of BVH and spline, at most.
+/// Most segments of a run that are traced again on BVH and spline.
 const MOST_RECHECKED: u64 = 10_000;
-/// The share of their segments that short runs have asked again: a check of 10,000 took a sixth of the time of a run of as many rays.
+/// The share of their segments that short runs trace again: a check of 10,000 took a sixth of the time of a run of as many rays.
 const RECHECKED_SHARE: f64 = 0.1;
 /// The fewest, even of the shortest run.
 const FEWEST_RECHECKED: u64 = 2000;
@@ -35,7 +35,7 @@ const FACETING_SEGMENTS: f64 = 100_000.0;
 const FACETING_REPLICATES: u32 = 64;
 
 impl PreparedScene {
-    /// Traces the scene, asks some of its rays again of BVH and spline, and measures what facets change of its light. Ignores the
+    /// Traces the scene, traces some of its rays again on BVH and spline, and measures what facets change of its light. Ignores the
     /// request's shard; where it asks for kernels to be verified, ignores all else of it, and the monitor.
     ///
     /// # Errors
@@ -87,8 +87,8 @@ fn unknown_cells_notes(error: &GeometricError, receivers: &[ReceiverResult]) -> 
     without.map(sentence).collect()
 }
 
-/// Asks a sample of the run's rays again, and traces some of them on facets and on the spline where no pilot has. The check is `None` where
-/// no ray can be asked again; the error too, unless a pilot measured it, and for a run on the spline.
+/// Checks a sample of the run's rays, and traces some of them on facets and on the spline where no pilot has. The check is `None` where
+/// no ray can be traced again; the error too, unless a pilot measured it, and for a run on the spline.
 ///
 /// The rays depend on the run alone, not on how it was divided: a merged or resumed run has the figures of an undivided one.
 fn recheck(
@@ -114,7 +114,7 @@ fn recheck(
 fn sample_segments(prepared: &PreparedScene, results: &Results, intersector: &dyn Intersector) -> Vec<Ray> {
     let settings = prepared.run_settings();
     let segments_a_ray = results.segments as f64 / results.rays.max(1) as f64;
-    // Twice the segments that are asked again, as rays differ in how many they have; of long paths more, that few rays not stand for all.
+    // Twice the segments that are traced again, as rays differ in how many they have; of long paths more, so that few rays do not dominate.
     let asked = ((RECHECKED_SHARE * results.segments as f64) as u64).clamp(FEWEST_RECHECKED, MOST_RECHECKED);
     let rays = (2.0 * asked as f64 / segments_a_ray.max(1.0)) as u64;
     // No more than the run has.
@@ -174,7 +174,7 @@ fn facet_effects(
         return None;
     }
     let segments_a_ray = results.segments as f64 / results.rays.max(1) as f64;
-    // Long paths cost more a ray: fewer of them show as much in the same time.
+    // Long paths cost more a ray: fewer of them give as much information in the same time.
     let rays = (FACETING_SEGMENTS / segments_a_ray.max(1.0)).clamp(FEWEST_FACETING_RAYS, FACETING_RAYS) as u64;
     let run = prepared.run_settings();
     // In replicates of their own, however the run itself is divided.

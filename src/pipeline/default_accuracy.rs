@@ -71,7 +71,7 @@ impl PilotSource for ModelPilotSource<'_> {
         };
         let choice = IntersectorChoice { intersector: IntersectorKind::Octree, normals: NormalMode::Exact };
         let groups = (&meshes[..], facets.instancing.as_deref());
-        // A part of choosing, of which alone the monitor is notified.
+        // Part of the choice, and the monitor sees only the choice.
         with_built_intersector(choice, builders, groups, &Silent, |moved, _| work(moved));
     }
 
@@ -82,7 +82,7 @@ impl PilotSource for ModelPilotSource<'_> {
 }
 
 /// Chooses facets or spline for a run; returns finer facets than it has too, where these are chosen. `surfaces` builds the true surface of
-/// each group, and is asked only where a pilot is traced.
+/// each group, and is called only where a pilot is traced.
 pub(super) fn choose<'a>(
     open: OpenRun<'a>,
     surfaces: &'a dyn Fn() -> &'a [Arc<TrueSurface>],

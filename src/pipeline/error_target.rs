@@ -47,7 +47,7 @@ pub struct TargetResult {
     pub rays: u64,
     /// Whether the error found is at most the one asked for.
     pub reached: bool,
-    /// Rays that are still missing, as far as the error shows, in whole replicates of a run that grows; 0 where it is reached, and where
+    /// Rays that are still missing, by the error found, in whole replicates of a run that grows; 0 where it is reached, and where
     /// all of the error is the rounding of each ray, which more of them do not lessen.
     pub missing_rays: u64,
 }
@@ -163,7 +163,7 @@ impl ErrorTarget {
     }
 
     /// Returns how many times as many rays the target asks for, by an error that falls with their root, and a margin more; may be below 1.
-    /// `found` is that error, percent, of so many replicates; without one, as nothing arrived, or of a single replicate, which gives none,
+    /// `found` is that error, percent, of so many replicates; without one, as nothing arrived, or of a single replicate, which has none,
     /// the factor is [`GROWTH_FROM_NOTHING`].
     fn growth(&self, found: Option<f64>, replicates: u32) -> f64 {
         // The error falls with the root of the rays, so that they go with the square of what is missing.

@@ -10,7 +10,7 @@ use crate::text::{count_of, figures, nearest_or_listed};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Makes the mesher's settings of what is asked, else of the scene, else of the defaults.
+/// Makes the mesher's settings from the request, else from the scene, else from the defaults.
 ///
 /// # Errors
 /// When a part, face or role is not there, or a role is asked for without a scene.
@@ -21,7 +21,7 @@ pub fn mesh_settings(
 ) -> Result<tessellate::Settings, Error> {
     let mut settings = tessellate::Settings::default();
     let accuracy = scene.map(|s| &s.accuracy);
-    // What is asked stands above the scene, the scene above the defaults.
+    // The request overrides the scene, the scene the defaults.
     if let Some(range) = meshing.tolerance.or(accuracy.and_then(|a| a.tolerance_mm)) {
         settings.tolerance = range;
     }

@@ -31,7 +31,7 @@ impl IntersectorChoice {
     /// # Errors
     /// When the scene names an intersector or normals that are not known.
     pub fn new(tracing: &TracingSettings, scene: Option<&Scene>) -> Result<Self, Error> {
-        // What is asked on the command line stands above the scene.
+        // The command line overrides the scene.
         let accuracy = scene.map(|s| &s.accuracy);
         let intersector = match (tracing.intersector, accuracy.and_then(|a| a.intersector.as_deref())) {
             (Some(intersector), _) => intersector,
@@ -61,7 +61,7 @@ pub fn refuse_facet_normals(tracing: &TracingSettings, scene: Option<&Scene>) ->
     }
     let why = "the spline has normals of its own";
     let error = match (tracing.normals.is_some(), tracing.intersector.is_some()) {
-        // Nothing of it was asked beside the scene: its keys are named.
+        // All of it comes from the scene, so its keys are named.
         (false, _) => Error::request(format!(
             "[accuracy] in the scene has `normals = \"{normals}\"` with `intersector = \"exact\"`: {why}"
         )),

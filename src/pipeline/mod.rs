@@ -1,4 +1,4 @@
-//! The main job: a scene and its models are read, faceted, given tolerance, normals and intersector where nobody asked for them,
+//! The main job: a scene and its models are read, faceted, given tolerance, normals and intersector where none were requested,
 //! traced, and every figure comes with both its errors. The command and the Python package run it through here alone.
 //!
 //! ```no_run
@@ -14,7 +14,7 @@
 //! # Ok::<(), lampyris::pipeline::Error>(())
 //! ```
 //!
-//! Guarantee: the same scene, files and settings give the same bits, whoever asks and whatever listens.
+//! Guarantee: the same scene, files and settings give the same bits, whoever calls and whichever monitor listens.
 //!
 //! The order of the modules, each of which uses only those before it, is in `tests/architecture/layers.rs`.
 

@@ -15,7 +15,7 @@ pub enum Stage<'a> {
     Tessellating,
     /// A pilot chooses between facets and spline.
     Choosing,
-    /// Facets that keep an accuracy are looked for; [`Monitor::study_progress`] says how far.
+    /// Facets that keep an accuracy are looked for; [`Monitor::study_progress`] reports how far.
     Aiming,
     /// An intersector is built.
     Building(IntersectorKind),
@@ -23,39 +23,39 @@ pub enum Stage<'a> {
     BuildingCheck(&'static str),
     /// Rays are traced, so many at most.
     Tracing(u64),
-    /// So many rays are asked again of the other intersectors.
+    /// So many rays are traced again by the other intersectors.
     Checking(u64),
 }
 
 /// Receives the progress of a job. Every method does nothing unless it is overridden.
 pub trait Monitor: Sync {
-    /// Told when a stage begins.
+    /// Called when a stage begins.
     fn begin(&self, _stage: Stage<'_>) {}
 
-    /// Told that so many rays of the stage are done, of so many; called from any thread. `false` ends tracing early.
+    /// Reports that so many rays of the stage are done, of so many; called from any thread. `false` ends tracing early.
     fn advance(&self, _done: u64, _total: u64) -> bool {
         true
     }
 
-    /// Told when verdicts leave so many rows unsure and the run goes on with so many rays.
+    /// Called when verdicts leave so many rows unsure and the run goes on with so many rays.
     fn unsettled(&self, _rows: usize, _rays: u64) {}
 
-    /// Told how far a study has come.
+    /// Reports how far a study has come.
     fn study_progress(&self, _progress: &study::Progress) {}
 
-    /// Told when the stage is over.
+    /// Called when the stage is over.
     fn end(&self) {}
 
-    /// Told when something went wrong that changes no result.
+    /// Called when something went wrong that changes no result.
     fn warns(&self, _message: &str) {}
 
-    /// Told when tolerance, normals and intersector were chosen.
+    /// Called when tolerance, normals and intersector were chosen.
     fn chosen(&self, _chosen: &TracingChoice) {}
 
-    /// Told when facets that keep an accuracy are found, with a sentence about them.
+    /// Called when facets that keep an accuracy are found, with a sentence about them.
     fn aimed(&self, _answer: &str) {}
 
-    /// Told that a run goes on with so many rays, as its error was so many per cent, or unknown where nothing arrived.
+    /// Reports that a run goes on with so many rays, as its error was so many per cent, or unknown where nothing arrived.
     fn grows(&self, _found_percent: Option<f64>, _rays: u64) {}
 }
 
@@ -65,7 +65,7 @@ pub struct Silent;
 
 impl Monitor for Silent {}
 
-/// Does a piece of work, with the monitor notified when it begins and ends.
+/// Does a piece of work and notifies the monitor when it begins and ends.
 pub(super) fn in_stage<T>(monitor: &dyn Monitor, stage: Stage<'_>, work: impl FnOnce() -> T) -> T {
     monitor.begin(stage);
     let made = work();

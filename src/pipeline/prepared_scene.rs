@@ -42,7 +42,7 @@ const RECORDED_PATHS: u64 = 2000;
 /// A job whose scene fits its model and whose facets are made.
 #[derive(Clone, Debug)]
 pub struct PreparedScene {
-    /// What was asked.
+    /// The scene with its model and settings.
     pub job: SceneJob,
     /// The scene on its model.
     pub bound: BoundScene,
@@ -60,13 +60,13 @@ pub struct PreparedScene {
     pub rays: Option<u64>,
     /// How it is traced and why, where settings and scene left that open.
     pub chosen: Option<TracingChoice>,
-    /// Built once for the run, where that asks the spline.
+    /// Built once for the run, where it uses the spline.
     surfaces: OnceLock<Vec<Arc<TrueSurface>>>,
     /// Built once for pilot and check; a run on the spline takes those of them that are not coarser than its own.
     few_ray_surfaces: OnceLock<Vec<Arc<TrueSurface>>>,
 }
 
-/// What a caller asks of a trace besides its settings.
+/// What a caller requests of a trace besides its settings.
 #[derive(Clone, Default)]
 pub struct TraceRequest<'a> {
     /// Whether to trace with the full kernel too and compare.
@@ -90,7 +90,7 @@ impl PreparedScene {
         (self.choice.intersector != IntersectorKind::Exact).then(|| self.mesh_settings.range())
     }
 
-    /// Binds the scene, so that its mistakes come before any work, chooses how to trace where nobody asks, and makes the facets of that
+    /// Binds the scene, so that its mistakes come before any work, chooses how to trace where that is open, and makes the facets of that
     /// choice. The choice sets tolerance, normals and intersector: that of another part of the run, else of the cache, else of a pilot that
     /// traces some of the run's rays.
     ///
@@ -122,7 +122,7 @@ impl PreparedScene {
             surfaces: OnceLock::new(),
             few_ray_surfaces: OnceLock::new(),
         };
-        // A run whose tracing is specified at all has no choice made for it.
+        // No choice is made for a run with any setting of how to trace it.
         let is_open = !is_accuracy_asked(&prepared.job.meshing, &prepared.job.tracing, &prepared.job.scene);
         let known = if is_open { prepared.known_choice(monitor) } else { None };
         if let Some(chosen) = known {
@@ -156,7 +156,7 @@ impl PreparedScene {
 
     /// Chooses by a pilot how to trace, or takes what another process finds that chooses for the same run, and makes the facets of that.
     fn choose_and_make_facets(&mut self, instancing: Option<&Arc<Instancing>>, monitor: &dyn Monitor) {
-        // Named by the run before anything of it is decided: that is what others know when they ask.
+        // Named by the run before anything of it is decided: that is all that other processes know when they look it up.
         let undecided = self.job.cache.as_ref().and(self.fingerprint().ok());
         let excess = self.coarsen_to_limit(instancing.map(Arc::as_ref));
         self.make_facets(instancing, monitor);
@@ -320,12 +320,12 @@ impl PreparedScene {
         [bare, model.placed_face_count()]
     }
 
-    /// Returns the run's settings: the scene's, with what was asked over them; the whole run, no shard.
+    /// Returns the run's settings: the scene's, overridden by those of the request; the whole run, no shard.
     pub fn run_settings(&self) -> RunSettings {
         let mut settings = RunSettings::from(&self.job.scene.run);
         settings.rays = self.rays.or(self.job.tracing.rays()).unwrap_or(settings.rays);
         if let Some(first) = self.job.tracing.ray_range.and_then(|range| range.first) {
-            // A run that grows to an error begins with its first ray, whatever range was asked.
+            // A run that grows to an error begins with its first ray, whatever range was requested.
             settings.first_ray = if self.rays.is_some() { 0 } else { first };
             settings.grows = true;
         }

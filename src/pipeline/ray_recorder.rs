@@ -1,4 +1,4 @@
-//! A fair sample of the very rays of a run, to be asked again of other intersectors.
+//! A fair sample of a run's own rays, to be traced again by other intersectors.
 
 use crate::intersect::{Cost, ExpectedRays, Footprint, Hit, Intersector};
 use crate::math::{Point, Ray, Vector};
@@ -6,7 +6,7 @@ use crate::model::{Model, PlacedFace};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Rays noted over rays wanted: a fifth more, as some cannot be asked again.
+/// Rays noted over rays wanted: a fifth more, as some cannot be traced again.
 const SPARE: f64 = 1.2;
 /// Rays kept over rays wanted, where many more come than were expected, as in an integrating sphere.
 const KEPT: usize = 4;
@@ -53,7 +53,7 @@ impl<'a> RayRecorder<'a> {
     }
 
     /// Returns at most `wanted` of the noted rays, in an order that depends on the rays alone. A ray that left a surface starts above it,
-    /// in free space, so that all intersectors are asked the same question whatever they take for the surface: where `start` says of the
+    /// in free space, so that all intersectors get the same query whatever they take for the surface: where `start` says of the
     /// ray and the unit normal to the side that it goes to. One that left a ready mesh, which has no surface, is left out.
     pub fn rays(self, wanted: usize, model: &Model, start: impl Fn(&Ray, Vector) -> Point) -> Vec<Ray> {
         let faces: Vec<PlacedFace> = model.placed_faces().collect();
@@ -88,7 +88,7 @@ fn hash(ray: &Ray) -> u64 {
 }
 
 impl Intersector for RayRecorder<'_> {
-    /// Single questions are no segments of a path: they ask what sources lie in, or where a face is that a ray starts from.
+    /// Single queries are no segments of a path: they find what sources lie in, or the face that a ray starts from.
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
         self.inner.intersect(ray, cost)
     }
@@ -102,9 +102,9 @@ impl Intersector for RayRecorder<'_> {
         self.inner.prepare_for(expected);
     }
 
-    /// A ray that escapes is not asked about any more: it is noted here.
+    /// A ray that escapes gets no further query: it is noted here.
     fn escapes(&self, ray: &Ray) -> bool {
-        // Asked first: the recorder must not change what the intersector is asked.
+        // Queried first: the recorder must not change the queries that the intersector gets.
         let escapes = self.inner.escapes(ray);
         if escapes {
             self.note(ray);

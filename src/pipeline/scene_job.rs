@@ -1,4 +1,4 @@
-//! What is asked of a scene, and its facets: from the cache, or made.
+//! A job: a scene with the settings requested for it, and its facets, from the cache or made.
 
 use super::cache::{Cache, CachedFacets, facets_key, group_keys};
 use super::facets::tessellate_groups;
@@ -15,7 +15,7 @@ use std::slice;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// A scene with its model, and what is asked of it.
+/// A scene with its model, and the settings requested for it.
 #[derive(Clone, Debug)]
 pub struct SceneJob {
     /// The scene.

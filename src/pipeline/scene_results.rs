@@ -14,7 +14,7 @@ use serde_json::Value;
 pub struct SceneResults {
     /// What was counted.
     pub results: Results,
-    /// Some of the rays asked again of BVH and spline; `None` where none could be.
+    /// The check of some of the rays on BVH and spline; `None` where none could be.
     pub check: Option<CrossCheck>,
     /// What the facets change of the light, where the run was on facets.
     pub geometric: Option<GeometricError>,
