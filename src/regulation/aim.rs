@@ -32,7 +32,7 @@ const LEAST_ELBOW_GRADIENT: f64 = 0.08;
 const SCAN_V_DEG: f64 = 3.0;
 
 /// Half the width of the opening of the vertical scan, degrees: the cut-off is level within 0.2° from 1.5° to 3.5° left (there, §2.2.3),
-/// and more of it gives its height with less noise.
+/// and a wider opening measures its height with less noise.
 const LEVEL_HALF_DEG: f64 = 0.5;
 
 /// V of the horizontal scan, degrees (there, §2.3.2, a).
@@ -44,7 +44,7 @@ const SCAN_H_DEG: f64 = 5.0;
 /// of 10°, where 15° are usual.
 const MOST_SLANT: f64 = 5.76;
 
-/// Most aims that rows are asked by. Where more are open nearly all of the map is noise: those asked lie as far apart as it takes.
+/// Most aims by which rows are judged. Where more are open nearly all of the map is noise: those used are spaced to stay within the limit.
 const MOST_RIVALS: usize = 150;
 
 /// Smaller turns count as the same aim, degrees: they move a reading on the steepest cut-off, of G = 1, by 1 %.
@@ -168,7 +168,7 @@ fn angle_text(angle_deg: f64) -> String {
     format!("{}°", hundredths / 100.0 + 0.0).replace('-', "−")
 }
 
-/// Returns as many of the aims as rows are asked by, spread over all of them.
+/// Returns at most [`MOST_RIVALS`] of the aims, spread over all of them.
 fn thinned(aims: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     let every = aims.len().div_ceil(MOST_RIVALS).max(1);
     aims.into_iter().step_by(every).collect()
@@ -308,7 +308,7 @@ mod tests {
             };
             let [h, v] = off([found.h_deg, found.v_deg]);
             let is_within = h <= reach(0) && v <= reach(1);
-            // Open places are asked a tenth of a degree apart, each for all that is as near to it.
+            // Open places are checked a tenth of a degree apart, each for all that is as near to it.
             let is_rival = found.rivals.iter().map(|rival| off(*rival)).any(|[h, v]| h < 0.25 && v < 0.15);
             assert!(is_within || is_rival, "{ray}: {found:?} for {truth:?}");
         }

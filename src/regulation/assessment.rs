@@ -15,11 +15,11 @@ pub struct RowVerdict {
     pub reading: Option<Reading>,
     /// Where it was read, degrees of the table; of a sum the first of its points.
     pub direction: Option<[f64; 2]>,
-    /// `None` where the row asks nothing that is measured here: notes, and rows under a condition.
+    /// `None` where the row requires nothing that is measured here: notes, and rows under a condition.
     pub verdict: Option<Verdict>,
     /// What would settle it, if it is unsure by every aim that the errors leave open.
     pub settles: Option<Settles>,
-    /// Directions that it asks about and that lie outside the far field, 1 for a zone of which any part does, and for a brightest direction
+    /// Directions that it needs and that lie outside the far field, 1 for a zone of which any part does, and for a brightest direction
     /// that may: with any, no rays settle it.
     pub unseen: usize,
 }

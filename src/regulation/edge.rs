@@ -69,7 +69,7 @@ impl Edge {
 }
 
 /// Returns how far, across it, an edge of this gradient may lie from where cells of this width let it be seen, at [`SIGMAS`], degrees.
-/// Light of such a gradient falls by 10^(G · width / 0.1°) over a cell, and the cells do not show where within: half the square of that
+/// Light of such a gradient falls by 10^(G · width / 0.1°) over a cell, and the cells do not resolve where within: half the square of that
 /// exponent, in widths, was not passed by beams of closed form in cells of 0.025° to 0.149°.
 pub(super) fn blur_by_cells(gradient: f64, cell_deg: f64) -> f64 {
     let decades = gradient * cell_deg / GRADIENT_DEG;

@@ -1,4 +1,4 @@
-//! What few rays leave open of a reading: the spread of replicates says nothing of rays that did not come.
+//! The uncertainty of a reading from few rays: the spread of replicates does not cover rays that did not arrive.
 //!
 //! Rays that land in an opening are counts. If each adds `a` candela and they are `m`, the truth may lie as far above as the upper limit of
 //! a Poisson count of `m`, times `a`: 6.6 rays at three standard errors where none came, by root and skewness where many did. Rays of

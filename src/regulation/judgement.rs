@@ -11,7 +11,7 @@ use crate::math::error_of_maximum;
 pub enum Verdict {
     /// Met, by more than three combined standard errors; of few rays, by as much as their number may be off at the same confidence.
     Pass,
-    /// Nearer to the limit than the errors allow, or outside the far field.
+    /// Too near to the limit for the errors, or outside the far field.
     Unsure,
     /// Not met, by more than three combined standard errors.
     Fail,
@@ -185,7 +185,7 @@ impl Judgement {
             // A limit that is just reached is met, where there is no error.
             passing += usize::from(enough && margin >= 0.0);
             failing += usize::from(enough && margin < 0.0);
-            // Of few rays the spread gives less than three errors of a count reach.
+            // For few rays the spread is less than three errors of a count.
             read.push([reading.value, reading.statistical.max(noise.reach(SIGMAS, 1.0) / SIGMAS)]);
             let luck = sigmas / SIGMAS;
             reading.statistical = reading.statistical.max(noise.reach(sigmas, 1.0) / SIGMAS);

@@ -39,7 +39,7 @@ pub struct Reading {
 
 impl Reading {
     /// Root of the sum of squares of the statistical and, where it is known, the geometric standard error: of what more rays and finer
-    /// facets would show.
+    /// facets would reduce.
     pub fn known_error(&self) -> f64 {
         self.geometric.map_or(self.statistical, |geometric| self.statistical.hypot(geometric))
     }

@@ -32,7 +32,7 @@ pub(super) fn judge_by_open_aims(
     let mut rows: Vec<RowVerdict> = as_aimed.into_iter().flatten().collect();
     // A standard error of which three reach as far as any other aim reads, with three errors of that.
     let mut spread = vec![0.0; rows.len()];
-    // All of them are asked: a row's error must not depend on their order.
+    // All of them are evaluated: a row's error must not depend on their order.
     let every = photometer.aim.rivals.len().div_ceil(MOST_FOR_EXTENDED).max(1);
     let judge = |(k, open): (usize, &Aim)| {
         let is_asked = |row: usize| k % every == 0 || !regulation.function.rows[row].is_extended();

@@ -151,7 +151,7 @@ impl Photometer<'_> {
     }
 }
 
-/// A direction and those on two rings around it, of this radius and of half of it, degrees: a smooth beam is as bright as is asked there if
+/// A direction and those on two rings around it, of this radius and of half of it, degrees: a smooth beam is as bright as required there if
 /// anywhere within.
 fn rings_around(direction: [f64; 2], radius_deg: f64) -> Vec<[f64; 2]> {
     let mut directions = vec![direction];

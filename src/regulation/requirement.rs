@@ -45,8 +45,8 @@ pub(super) struct Requirement {
     pub(super) unseen: usize,
 }
 
-/// Turns what a row asks into requirements that must all be met, with what the errors of the aim change of their readings; empty where it
-/// asks nothing that can be measured. `rows` are those of its function, to which a relative row refers.
+/// Turns a row into requirements that must all be met, with the change of their readings by the errors of the aim; empty where it
+/// requires nothing that can be measured. `rows` are those of its function, to which a relative row refers.
 pub(super) fn requirements(photometer: &Photometer, rules: &Rules, row: &Row, rows: &[Row]) -> Vec<Requirement> {
     let mut requirements = requirements_as_aimed(photometer, rules, row, rows);
     let read = |c: &Comparison| photometer.map.read(&c.weights).value;

@@ -1,9 +1,9 @@
-//! One requirement of a regulation: what is asked, where, and where the figure comes from.
+//! One requirement of a regulation: what is required, where, and the source of the figure.
 
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// What a row asks about.
+/// What a row is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RowKind {
@@ -42,7 +42,7 @@ pub enum Bound {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
-    /// What it asks about.
+    /// What it is about.
     #[serde(deserialize_with = "row_kind")]
     pub kind: RowKind,
     /// Its name in the table.
@@ -83,7 +83,7 @@ pub struct Row {
     pub source: String,
     /// `two` where a second source was compared, `one` otherwise.
     pub evidence: String,
-    /// How a minimum came about, how a zone is walked and what a note asks: words of the tables of which nothing is measured.
+    /// How a minimum came about, how a zone is walked and what a note requires: words of the tables that are not measured.
     #[serde(rename = "percent")]
     pub(super) _percent: Option<IgnoredAny>,
     #[serde(rename = "measure")]

@@ -16,7 +16,7 @@ const COARSE_CELLS: &str = "the width of the far field's cells alone leaves open
     narrower ones";
 
 /// Judges the rows of which `is_asked`, by their place in the table, as the map is aimed, points that the sum of their group may save with
-/// that; `None` for the others. Whether another aim is open is not asked.
+/// that; `None` for the others. Whether another aim is open is not checked.
 pub(super) fn judge_rows(
     photometer: &Photometer,
     regulation: &Regulation,
@@ -26,7 +26,7 @@ pub(super) fn judge_rows(
     let judge = |row: &Row| judge_row(photometer, regulation, assumptions, row);
     let all = regulation.function.rows.iter().enumerate();
     let mut rows: Vec<Option<RowVerdict>> = all.map(|(k, row)| is_asked(k).then(|| judge(row))).collect();
-    // The group is asked only where a point's own minimum is not met.
+    // The group is evaluated only where a point's own minimum is not met.
     if regulation.function.has_group_alternative() {
         let sums = rows.iter().flatten().filter(|r| r.row.kind == RowKind::GroupSum);
         let groups: Vec<(Option<u32>, Option<Verdict>)> = sums.map(|r| (r.row.group, r.verdict)).collect();
@@ -61,7 +61,7 @@ fn judge_with_group(point: &Row, group: Option<Verdict>, judge: impl Fn(&Row) ->
     RowVerdict { row, ..worst }
 }
 
-/// Judges a row by itself, by its worst requirement; rows with conditions on use, and those that ask nothing measured, stay without a
+/// Judges a row by itself, by its worst requirement; rows with conditions on use, and those that require nothing measured, stay without a
 /// verdict.
 pub(super) fn judge_row(
     photometer: &Photometer,
@@ -82,7 +82,7 @@ pub(super) fn judge_row(
         && let Some(min) = row.min
     {
         asked.min = Some(floor * min);
-        // Else it would read as if less than is asked were enough.
+        // Else it would read as if less than required were enough.
         verdict.row.add_note(&format!("{:.3} cd are enough here beside its group's sum", floor * min));
     }
     let requirements = requirements(photometer, &regulation.rules, &asked, &regulation.function.rows);

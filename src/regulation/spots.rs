@@ -95,7 +95,7 @@ mod tests {
         assert_eq!(verdict(&spot([2.0, -1.0], 1.0), 0.9, 1e-3), Verdict::Pass);
         // What may be brighter by its error fills more than a spot.
         assert_eq!(verdict(&spot([2.0, -1.0], 1.0), 1.02, 0.05), Verdict::Unsure);
-        // Two spots are two, a streak is larger than one however thin, and beyond the test points nothing is asked.
+        // Two spots are two, a streak is larger than one however thin, and beyond the test points there is no requirement.
         let [left, right] = [spot([-6.0, 2.0], 0.4), spot([6.0, 2.0], 0.4)];
         assert_eq!(verdict(&|h, v| left(h, v) || right(h, v), 3.0, 1e-3), Verdict::Pass);
         assert_eq!(verdict(&|h: f64, v: f64| h.abs() < 0.4 && v.abs() < 10.0, 3.0, 1e-3), Verdict::Fail);

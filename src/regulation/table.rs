@@ -1,4 +1,4 @@
-//! The tables of regulations: what is asked, in which direction, and where the figure comes from.
+//! The tables of regulations: what is required, in which direction, and the source of the figure.
 
 use super::row::{Row, with_key};
 use crate::text::nearest_name;
@@ -66,12 +66,12 @@ pub struct Function {
     point_rule: PointRule,
     /// The cut-off that is brought to its place before measuring; `None` for what is measured as placed.
     pub(super) cut_off: Option<CutOff>,
-    /// What is asked.
+    /// The requirements.
     pub rows: Vec<Row>,
 }
 
 impl Function {
-    /// The share of its own minimum that each point of a group must reach beside the group's sum; `None` where all of it is asked.
+    /// The share of its own minimum that each point of a group must reach beside the group's sum; `None` where all of it is required.
     pub(super) fn point_floor(&self) -> Option<f64> {
         (self.point_rule == PointRule::Floor60).then_some(0.6)
     }

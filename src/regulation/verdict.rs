@@ -109,7 +109,7 @@ fn realign(
         .collect();
     // The least turn first: what mends by little is nearer to the lamp as aimed.
     turns.sort_by_key(|(h, v)| h * h + v * v);
-    // Rows that failed are asked first: most turns do not mend them.
+    // Failed rows are checked first: most turns do not mend them.
     let mut failed: Vec<&Row> =
         first.rows.iter().filter(|r| r.verdict == Some(Verdict::Fail)).map(|r| &r.row).collect();
     // Points and sums take least time.

@@ -1,4 +1,4 @@
-//! Who is right when two intersectors on the same facets differ: all facets are asked again with twice the digits.
+//! Decides which of two intersectors on the same facets is right where they differ: all facets are tested again with twice the digits.
 //!
 //! Signs of the edge functions (the volume of the ray and two corners) and distances are computed in pairs of f64, about
 //! 106 bits (Dekker, *A Floating-Point Technique for Extending the Available Precision*, 1971), by code that shares
@@ -6,7 +6,7 @@
 //!
 //! Guarantee: an answer is called false only when it is a miss though a facet is truly met, a hit where no facet is met even
 //! within 1e-13 of the lengths involved, or a hit behind a nearer true one.
-//! Weakness: only distances are judged, to single precision, not which facet was named. Every facet is asked, so a verdict costs
+//! Weakness: only distances are judged, to single precision, not which facet was named. Every facet is tested, so a verdict costs
 //! milliseconds on a million of them. At silhouettes, on the border of an open mesh and at the ends of the ray's range both a hit and a
 //! miss within that band are true.
 
@@ -76,7 +76,7 @@ pub fn arbitrate(mesh: &FacetMesh, ray: &Ray, first: Option<&Hit>, second: Optio
                 && nearest.is_none_or(|n| hit.t <= n || same_distance(n, hit.t))
         }
     };
-    // Two right answers may differ at a silhouette; two wrong ones say nothing of either.
+    // Two right answers may differ at a silhouette; two wrong ones decide nothing.
     match (holds(first), holds(second)) {
         (true, false) => Arbitration::First,
         (false, true) => Arbitration::Second,
@@ -103,7 +103,7 @@ fn passes_near(ray: &Ray, corners: &[Point; 4]) -> bool {
     aside.length() <= reach * (1.0 + CULL_RELATIVE) + CULL_ROUNDING * (1.0 + from_corner.length())
 }
 
-/// A triangle that the ray meets as far as rounding can show.
+/// A triangle that the ray meets to within rounding.
 struct Crossing {
     /// Distance, mm.
     t: f64,

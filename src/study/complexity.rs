@@ -170,7 +170,7 @@ fn time_ready(
     };
     let traditional = ready.iter().find(|r| r.name == "traditional");
     let few = traditional.map_or(settings.rays, |t| {
-        // A short run first says how many rays the time allows.
+        // A short run first shows how many rays the time allows.
         let start = Instant::now();
         run(t.intersector, 1024);
         let affordable = 1024.0 * settings.traditional_seconds / start.elapsed().as_secs_f64();

@@ -24,7 +24,7 @@ use std::time::Instant;
 
 /// The pilot traces one ray in so many.
 const SHARE: u64 = 32;
-/// Least and most rays of a pilot: fewer say nothing of a map, more would only show what is far below what people look at.
+/// Least and most rays of a pilot: fewer resolve no map, more would only show differences too small to matter.
 const PILOT_RAYS: [u64; 2] = [4096, 65_536];
 /// Runs of at most so many rays take the spline at once: a pilot would cost much of what facets could save.
 const SHORT_RUN: u64 = 32_768;
@@ -256,7 +256,7 @@ impl UndecidedRun<'_> {
     /// Chooses facets or spline by what is known without tracing, as for flat faces, ready meshes alone and short runs; `None` where a
     /// pilot is needed.
     fn without_pilot(&self) -> Option<TracingChoice> {
-        // What is cheap to ask comes first.
+        // Cheap checks come first.
         let has_no_surface = self.facets.is_empty();
         let ((intersector, normals), because) = if has_no_surface {
             (ON_FACETS, if self.faces().next().is_none() { NO_MODEL } else { NO_FACETS })

@@ -19,7 +19,7 @@ pub struct Row {
     pub added: Option<&'static str>,
     /// Name of the kernel. Choices that need the same kernel share its times: they are the same code.
     pub kernel: String,
-    /// Effects that the kernel was asked to be able to do.
+    /// Effects that the kernel was requested to support.
     pub effects: Vec<&'static str>,
     /// Rays from the sources.
     pub rays: u64,
@@ -85,7 +85,7 @@ pub fn effects(
     let row = |(choice, added, kernel): &(&str, Option<Effect>, KernelChoice)| {
         let (t, called, rays, own) = ran(&with(*kernel))?;
         let able = match kernel {
-            // What the kernel was asked to do, which may be less than what it can.
+            // The requested effects, which may be fewer than the kernel supports.
             KernelChoice::Full => Effects::ALL,
             _ => added.map_or(needed, |e| needed.with_effect(e)),
         };

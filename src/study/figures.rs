@@ -1,6 +1,6 @@
 //! The figures that a run prints for each receiver, each with both its errors.
 //!
-//! Where no ray arrived the spread of the rays says nothing, and is no error of 0: what one ray adds is stated instead. Three times that
+//! Where no ray arrived the rays have no spread, which is not an error of 0: what one ray adds is stated instead. Three times that
 //! is the limit of 95 % of what may be there (the rule of three: of n rays none arrives with probability e⁻³ where 3/n of them should).
 
 use super::geometric_error::{GeometricError, Paired, ReceiverError};

@@ -34,7 +34,7 @@ impl HitErrors {
         for ((ray, hit), truth) in rays.iter().zip(hits).zip(exact) {
             let (h, t) = match (hit, truth) {
                 (None, None) => continue,
-                // On another face the distance says nothing of the facets: it is counted, not averaged.
+                // On another face the distance says nothing about the facets: it is counted, not averaged.
                 (Some(h), Some(t)) if h.face == t.face => (h, t),
                 _ => {
                     e.flips += 1;

@@ -117,7 +117,7 @@ pub(super) fn mesh_of(mesh_source: &dyn MeshSource, facets: usize) -> MeasuredMe
 }
 
 /// Measures errors and times of all kinds of normals on one model, on facets of about the wanted number; a row for each. Calls `tell` with
-/// the share that is done.
+/// the share done.
 fn rows_of_model(name: &str, mesh_source: &dyn MeshSource, settings: &Settings, tell: &dyn Fn(f64)) -> Vec<Row> {
     tell(0.0);
     let meshed = mesh_of(mesh_source, settings.facets);

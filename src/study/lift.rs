@@ -1,4 +1,4 @@
-//! Where a ray begins that leaves a surface, so that facets and spline are asked the same question.
+//! Where a ray that leaves a surface begins, so that facets and spline get the same query.
 
 use crate::intersect::{Cost, Intersector};
 use crate::math::{Point, Ray, Vector};

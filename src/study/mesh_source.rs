@@ -1,4 +1,4 @@
-//! Where a study gets its meshes and intersectors from, and how it asks them about many rays.
+//! Where a study gets its meshes and intersectors from, and how it traces many rays on them.
 
 use super::tolerance_plan::TolerancePlan;
 use crate::intersect::{Cost, Hit, Intersector, NormalMode};

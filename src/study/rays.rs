@@ -1,4 +1,4 @@
-//! Rays to ask of a model, each a pure function of its index: a camera's, random ones through the box, and bounces.
+//! Rays to trace through a model, each a pure function of its index: a camera's, random ones through the box, and bounces.
 
 use super::{Lift, Random};
 use crate::intersect::{Cost, Intersector};
@@ -121,7 +121,7 @@ pub const RAYS_PER_PATH: u64 = 8;
 
 /// Incoherent rays: paths of up to eight rays that leave each hit in a random direction on the side they came from.
 ///
-/// A ray starts above the surface, in free space, so that all intersectors are asked the very same question whatever they take for the
+/// A ray starts above the surface, in free space, so that all intersectors get the very same query whatever they take for the
 /// surface. A path that leaves the model begins anew.
 #[derive(Clone, Copy)]
 pub struct Bounces<'a> {
@@ -133,7 +133,7 @@ pub struct Bounces<'a> {
 impl<'a> Bounces<'a> {
     /// Makes `count` rays through a box, mm; `guide` finds the points they leave, and `tolerance` is the loosest of the facets, mm.
     pub fn new(bounds: &Aabb, guide: &'a dyn Intersector, tolerance: f64, seed: u64, count: u64) -> Self {
-        // Another stream than that of `Uniform` with this seed, whose rays may be asked beside these.
+        // Another stream than that of `Uniform` with this seed, whose rays may be traced beside these.
         Self {
             first: Uniform::new(bounds, seed ^ 0x9e6c_63d0_876a_9a47, count),
             guide,

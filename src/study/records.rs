@@ -1,6 +1,6 @@
 //! Ray files: little-endian `f64` records `ox oy oz dx dy dz t`, `t` infinite for a miss and ignored on reading.
 //!
-//! Whoever reads such a file can ask any other program the same rays.
+//! From such a file any other program can trace the same rays.
 
 use crate::math::{Point, Ray, Vector};
 use std::io::{self, Read, Write};

@@ -11,7 +11,7 @@ use std::time::Instant;
 /// Times are never taken as shorter, s: the resolution of the clock, so that no ratio is infinite.
 const LEAST_SECONDS: f64 = 1e-9;
 
-/// Kinds of normals that the receivers are asked about.
+/// Kinds of normals for which the receivers are evaluated.
 const KINDS: [NormalMode; 4] = [NormalMode::Flat, NormalMode::Bilinear, NormalMode::Cubic, NormalMode::Exact];
 
 /// Sweeps a model, then traces its light on facets of every uniform tolerance of the sweep and on the spline; without a uniform tolerance

@@ -1,4 +1,4 @@
-//! Surface rays, as a simulation asks most: they start on facets, where the ray before them hit.
+//! Surface rays, the most frequent in a simulation: they start on facets, where the ray before them hit.
 
 use super::Random;
 use super::rays::RaySource;

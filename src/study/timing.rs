@@ -33,7 +33,7 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// Shortest time of a round that a rate is made of, s: below it a clock says nothing.
+    /// Shortest time of a round that a rate is made of, s: below it the clock is too coarse.
     pub const SHORTEST: f64 = 1e-12;
 
     /// Returns million rays a second, of so many rays in these seconds, [`Self::SHORTEST`] at least.

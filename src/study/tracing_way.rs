@@ -49,7 +49,7 @@ pub(super) fn ways_before_spline(excess: f64, facets: usize, hits: f64) -> Vec<W
     let factor = MARGIN * excess;
     // The number of facets goes with the inverse of the tolerance.
     let finer = factor * facets as f64 * FACET + hits * FACET_HIT * longer_on(factor);
-    // Of moved hits only a trial shows about how many the spline must be asked.
+    // Only a trial shows for how many moved hits the spline must be queried.
     let mut ways = vec![(Way::Moved, hits * MOVED_HIT)];
     if factor <= MOST_FINER {
         ways.push((Way::Finer(factor), finer));
@@ -60,7 +60,7 @@ pub(super) fn ways_before_spline(excess: f64, facets: usize, hits: f64) -> Vec<W
 }
 
 /// Says why moved hits are not taken however little they get wrong; `None` where they may be. `lost` is the light lost by them and by the
-/// spline, `asked` the share of hits about which the spline was asked.
+/// spline, `asked` the share of hits for which the spline was queried.
 pub(super) fn unfit_moved_hits(lost: [f64; 2], asked: f64) -> Option<&'static str> {
     if lost[0] > lost[1] {
         Some("hits moved to the spline lose more light than it")

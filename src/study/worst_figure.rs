@@ -15,7 +15,7 @@ const RANDOM_ORDER: f64 = 0.5;
 const NEGLIGIBLE: f64 = 1e-6;
 /// Ratio up to which two figures are as wrong as one another.
 const AS_WRONG: f64 = 1.01;
-/// The largest multiple of a standard error that is reported: beyond, that error is none.
+/// The largest multiple of a standard error that is reported: beyond it that error counts as none.
 const LARGEST_RATIO: f64 = 1e9;
 
 /// The figure that facets get most wrong.

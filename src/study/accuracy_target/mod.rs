@@ -2,10 +2,10 @@
 //!
 //! A facet of sag s on a surface of radius R met at incidence i misdirects the mirrored ray by up to 2·(s/R)·tan i with interpolated
 //! normals and 2·acos(1 − s/R) with flat ones. Pilot rays on the spline give radius and incidence on every face, and with them a
-//! tolerance in proportion to the radius, sag ≤ ε·R/(2 tan i). The same rays on such facets then show how far each face is from what was
-//! asked, for facets do not err as much as the formula allows. Fresh rays judge the result against the spline.
+//! tolerance in proportion to the radius, sag ≤ ε·R/(2 tan i). The same rays on such facets then show how far each face is from the
+//! target, for facets do not err as much as the formula allows. Fresh rays judge the result against the spline.
 //!
-//! Every kind of normals that could be the cheapest is made to reach what is asked. What is cheapest follows from counted work, never from
+//! Every kind of normals that could be the cheapest is made to reach the target. Which is cheapest follows from counted work, never from
 //! a clock, so that every machine takes the same facets; the seconds of the answer are measured. It names the largest error beside the
 //! 99th percentile, and rays that no angle stands for. Known weakness: other rays (more grazing ones) err more.
 
@@ -24,7 +24,7 @@ use serde::Serialize;
 /// Facets that a mesh of a search may have, by default: each takes 15 µs on one core of a server.
 const MOST_FACETS: f64 = 6e6;
 
-/// What is asked.
+/// The accuracy to reach.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AccuracyTarget {
     /// Direction error that 99 % of the hits on curved faces must keep, of the mirrored light and, where a face is known to let light
@@ -73,7 +73,7 @@ pub struct AccuracyResult {
     pub reached_deg: Option<f64>,
     /// The largest error of these rays, degrees; `None` as above.
     pub largest_deg: Option<f64>,
-    /// Whether the 99th percentile is within what was asked; also where no ray of the check hit anything.
+    /// Whether the 99th percentile is within the target; also where no ray of the check hit anything.
     pub kept: bool,
     /// Kind of normals to trace with.
     #[serde(serialize_with = "by_name")]

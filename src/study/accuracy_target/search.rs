@@ -27,7 +27,7 @@ const COARSEST_FACTOR: f64 = 4.0;
 
 /// Rays that look at the model first, and that facets are tuned on.
 const PILOTS: u64 = 65_536;
-/// What is asked is aimed at with this much to spare, since the 99th percentile of fresh rays differs by some percent.
+/// The target is aimed at with this much to spare, since the 99th percentile of fresh rays differs by some percent.
 const MARGIN: f64 = 0.9;
 /// Meshes made for one kind of normals.
 const ATTEMPTS: usize = 6;
@@ -68,8 +68,8 @@ pub fn meet_target(
     meet_target_for_light(model, mesh_source, target, light, progress)
 }
 
-/// Finds the cheapest tolerances and normals that reach an accuracy for light of one's own, such as that of a scene, whose rays are asked
-/// for under several seeds. The best found where none reaches it; runs on the current rayon pool, and ends after a counted amount of work.
+/// Finds the cheapest tolerances and normals that reach an accuracy for the caller's light, such as that of a scene, whose rays are made
+/// for several seeds. The best found where none reaches it; runs on the current rayon pool, and ends after a counted amount of work.
 ///
 /// # Errors
 /// When the angle is not above 0 and below 90 degrees.
@@ -83,7 +83,7 @@ pub fn meet_target_for_light(
     target.check_angle()?;
     let start = Instant::now();
     let clock = Clock::new(progress);
-    // The spline's hits are the truth, and decide which faces matter and how sharply they bend.
+    // The spline's hits are the truth, and show which faces matter and how sharply they bend.
     clock.report("pilot rays", 0.0);
     let pilots = ReferenceRays::new(mesh_source, (light.rays)(mesh_source.exact(), target.seed, PILOTS));
     let survey = Survey::new(model, &pilots.rays, &pilots.truth);
@@ -117,7 +117,7 @@ pub fn meet_target_for_light(
         }
         let stage = format!("{} normals", candidate.normals);
         clock.report(&stage, 0.2 + 0.8 * k as f64 / kinds.len() as f64);
-        // What nobody could mesh in reasonable time is tried, coarser, only while nothing else keeps what is asked.
+        // What cannot be meshed in reasonable time is tried, coarser, only while nothing else reaches the target.
         let is_open = best.as_ref().is_none_or(|b| !b.is_kept(target));
         let Some(found) = search.reach(candidate, is_open, &mut trials) else { continue };
         let better = |b: &Solution| match (found.is_kept(target), b.is_kept(target)) {
@@ -270,7 +270,7 @@ impl Search<'_> {
         most.min(LARGEST_MESHES * most - self.made.get())
     }
 
-    /// Meshes, asks fresh rays, and mends the plan until what is asked is reached without waste, [`ATTEMPTS`] are made, or the next would
+    /// Meshes, traces fresh rays, and corrects the plan until the target is reached without waste, [`ATTEMPTS`] are made, or the next would
     /// have too many facets; adds each to `trials` and returns the best. A plan of too many from the start is made coarser where `is_open`
     /// says that nothing better is there, else `None`; also where the search has used up its facets.
     fn reach(&self, candidate: &Candidate, is_open: bool, trials: &mut Vec<Trial>) -> Option<Solution> {
@@ -289,7 +289,7 @@ impl Search<'_> {
         for attempt in 0..ATTEMPTS {
             let m = self.measure(&plan, normals, |facets, apart_mm| self.judge(facets, apart_mm));
             self.made.set(self.made.get() + m.made.len() as f64);
-            // Both sets of rays must keep what is asked.
+            // Both sets of rays must reach the target.
             let worst =
                 |of: fn(&DirectionErrors) -> Option<f64>| m.errors.iter().filter_map(of).max_by(f64::total_cmp);
             let reached = worst(DirectionErrors::percentile);
@@ -330,7 +330,7 @@ impl Search<'_> {
             if best.as_ref().is_none_or(better) {
                 best = Some(found);
             }
-            // A plan that fell short after one that did not ends the search: what is asked lies between.
+            // A plan that fell short after one that did not ends the search: the target lies between.
             if normals == NormalMode::Exact || good && !wasteful || !good && was_good {
                 break;
             }

@@ -70,7 +70,7 @@ impl Solution {
         self.reached.map_or(self.flips == 0, |reached| reached <= limit_deg)
     }
 
-    /// Whether the 99th percentile is within what is asked.
+    /// Whether the 99th percentile is within the target.
     pub(super) fn is_kept(&self, target: &AccuracyTarget) -> bool {
         self.is_within(target.angle_deg)
     }
@@ -105,7 +105,7 @@ impl Solution {
         if self.checked as f64 * BEYOND_PERCENTILE < FEW_BEYOND { ", too few to be sure of it" } else { "" }
     }
 
-    /// Returns what was asked, what was reached and by which facets and normals, as one sentence; `gave_up` where finer facets were too
+    /// Returns the target, what was reached and by which facets and normals, as one sentence; `gave_up` where finer facets were too
     /// many to be tried.
     pub(super) fn answer_sentence(&self, target: &AccuracyTarget, gave_up: bool) -> String {
         let [low, high] = self.plan.tolerance_mm();

@@ -43,7 +43,7 @@ impl ReferenceRays {
                 }
                 _ => None,
             };
-            // In another place there is no angle: such rays are distinguished from the percentile.
+            // In another place there is no angle: such rays are counted apart from the percentile.
             match error {
                 // However many they are, they must not make up for those that err.
                 Some((face, _)) if survey.is_flat(face) => found.flat += 1,

@@ -58,7 +58,7 @@ impl Border {
     /// Returns the distance of `p` from some place of the border within `enough`, mm, where there is one, not always the nearest; else a
     /// number above `enough`.
     pub(super) fn distance(&self, surface: &Surface, p: Point, enough: f64) -> f64 {
-        // On parts smaller than the band every sample is near: one of them says all that is asked.
+        // On parts smaller than the band every sample is near: one of them is enough.
         if let Some(near) = self.samples.iter().map(|s| s.1.distance(p)).find(|&d| d <= enough) {
             return near;
         }

@@ -117,7 +117,7 @@ impl<'a> Classifier<'a> {
             let (u, v) = (f64::from(k / 5) / 4.0, f64::from(k % 5) / 4.0);
             if u >= v { a + (b - a) * (u - v) + (c - a) * v } else { a + (d - a) * (v - u) + (c - a) * u }
         });
-        // Each point is near the one before; which way the surface bends there is not asked.
+        // Each point is near the one before; which way the surface bends there does not matter.
         let mut guess = surface.nearest_seeds::<1>(a)[0];
         let mut distance = |p: Point| {
             let foot = surface.foot(p, guess, Vector::ZERO);
@@ -206,7 +206,7 @@ impl<'a> Classifier<'a> {
         let later = |o: &Hit| LaterHit { t: o.t, band: self.band(o.face, ray, surface.gap) };
         let other_face = other.filter(|o| o.face != first.face).map(later).or(elsewhere);
         let cause = self.cause(ray, first, (same_face, other_face), surface, sag);
-        // Facets that the mesher itself does not vouch for, and that stray farther than was asked: so much is measured here.
+        // Facets that the mesher itself does not vouch for, and that stray farther than requested: that is measured here.
         if matches!(cause, Cause::Unexplained(_)) {
             let measured = self.unproved_sag(ray, first, facet);
             let others = (same_face, other_face);

@@ -24,7 +24,7 @@ pub(super) struct FaceFacets {
 }
 
 impl FaceFacets {
-    /// Adds a facet; all are added before any line is asked about.
+    /// Adds a facet; all are added before the first query.
     pub(super) fn push(&mut self, facet: u32) {
         self.facets.push(facet);
     }
@@ -67,7 +67,7 @@ mod tests {
         let mesh = sample_models::grid_mesh(&sample_models::model("ball", [ball]), 24);
         let mut face = FaceFacets::default();
         (0..mesh.facets.len() as u32).for_each(|i| face.push(i));
-        // Sags of all sizes, so that the wrong facet is recognised.
+        // Sags of all sizes, so that a wrong facet shows.
         let sag = |i: u32| 1e-4 * f64::from(i * 7919 % 1000);
         let (bounds, mut random, mut missed) = (mesh.bounds(), Random::new(3, 0), 0);
         for _ in 0..500 {

@@ -10,7 +10,7 @@ use std::hint::black_box;
 /// Rays of a batch: as many as a task of the cross-check has. The hits of all timed rays at once took as much memory as an octree.
 const BATCH: usize = 2048;
 
-/// An intersector and how it is asked while it is timed.
+/// An intersector and how it is called while it is timed.
 #[derive(Clone, Copy)]
 pub struct TimedIntersector<'a> {
     /// As in [`PerIntersector`]: `octree`, `octree_single`, `bvh2`, `cwbvh`, `cwbvh_as_shipped`, `polish`, `exact`.

@@ -36,7 +36,7 @@ use grouped::Classifiers;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Who is asked about a model of whose parts some are placed often and have coordinates of their own.
+/// The intersectors of a model some of whose parts are placed often and have coordinates of their own.
 #[derive(Clone)]
 pub struct GroupedIntersectors<'a> {
     /// The model of each group, with the facets that were made of it.
@@ -51,7 +51,7 @@ pub struct GroupedIntersectors<'a> {
     pub exact: &'a dyn Intersector,
 }
 
-/// Who is asked.
+/// The intersectors under check.
 #[derive(Clone, Copy)]
 pub struct Intersectors<'a> {
     /// The model the facets were made of.
@@ -69,7 +69,7 @@ pub struct Intersectors<'a> {
 /// How the cross-check works.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Sag assumed for facets without a proved one, mm: the tolerance that was asked of the mesher.
+    /// Sag assumed for facets without a proved one, mm: the tolerance requested of the mesher.
     pub fallback_band_mm: f64,
     /// Most disagreeing rays to keep for writing out and drawing; all are counted.
     pub keep: usize,

@@ -245,7 +245,7 @@ impl PlacedSurface {
                 if self.border_distance(foot.point, band + 2.0 * self.gap) <= band + 2.0 * self.gap {
                     found.border = true;
                 }
-                // Beyond the band the side is decided; a foot that is held has left the face.
+                // Beyond the band the side is known; a foot that is held has left the face.
                 if foot.offset.abs() > band || foot.held {
                     found.sides[end] = if foot.offset < 0.0 { -1 } else { 1 };
                     break;
@@ -366,7 +366,7 @@ mod tests {
             let direction = Vector::new(1.0, 0.0, rise).normalize();
             let ray = Ray::new(Point::new(10.5, 5.0, 0.0) - direction * 20.0, direction);
             assert_eq!(s.is_beyond_border(&ray, 20.0, Uv::new(0.9, 0.5), 0.1), beyond, "{rise}");
-            // Nor is it reported of a hit 0.2 off the plane.
+            // Nor is it known for a hit 0.2 off the plane.
             let above = Ray { origin: ray.origin + Vector::Z * 0.2, ..ray };
             assert!(!s.is_beyond_border(&above, 20.0, Uv::new(0.9, 0.5), 0.1));
         }

@@ -20,7 +20,7 @@ pub enum Cause {
     Coincident,
     /// The spline's hit is a touch within 1e-9 mm.
     Tangent,
-    /// The facet has no proved sag, and the cross-check's own measure of it is more than was asked and explains the difference.
+    /// The facet has no proved sag, and the cross-check's own measure of it is more than the tolerance and explains the difference.
     Unproved,
     /// The face was not meshed, so the facets cannot answer.
     Unmeshed,
@@ -96,11 +96,11 @@ pub struct Disagreement {
 /// What the cross-check found, as `check --json` gives it.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct CrossCheck {
-    /// Rays asked.
+    /// Rays checked.
     pub rays: u64,
     /// Rays with a hit on the facets.
     pub hits: u64,
-    /// What was asked.
+    /// Size of the scene that was checked.
     pub scene: SceneSize,
     /// Octree against BVH.
     pub octree_vs_bvh: FacetsDiffer,
@@ -120,7 +120,7 @@ pub struct CrossCheck {
     pub disagreements: Vec<Disagreement>,
 }
 
-/// Sizes of what was asked.
+/// Size of the scene that was checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct SceneSize {
     /// Facets.

@@ -1,6 +1,6 @@
 //! What facets change of the cells of a receiver: of each alone or with its neighbours, of the brightest, of all together.
 //!
-//! The square of a measured difference exceeds that of the true one by its variance, so sums of `d² − s²` over many cells show a
+//! The square of a measured difference exceeds that of the true one by its variance, so sums of `d² − s²` over many cells reveal a
 //! geometric error that no single cell could.
 
 use super::paired::{Paired, SIGNIFICANT};
@@ -94,7 +94,7 @@ pub(super) struct CellPairs<'r> {
     /// Rows or columns of cells that are slivers of one direction, a pole.
     poles: Vec<Block>,
     cells: Vec<Cell>,
-    /// The cells of power, whose quanta say how many rays came; `None` where the layer's own do, as it is not weighted.
+    /// The cells of power, whose quanta give the number of rays; `None` where the layer's own do, as it is not weighted.
     power: Option<Vec<Cell>>,
     /// Quanta of a ray of the mean power.
     ray: f64,

@@ -57,7 +57,7 @@ impl Means {
 }
 
 /// Returns both values with the error of their difference, from replicates of the same rays, all times `scale`; the error of a single
-/// replicate is `scale` itself, as its own mean says nothing of its spread.
+/// replicate is `scale` itself, as its own mean says nothing about its spread.
 fn paired_figure(facets: &Influence, spline: &Influence, scale: f64) -> Paired {
     let difference = facets.by_replicate.iter().zip(&spline.by_replicate).map(|(a, b)| a - b);
     let difference: Vec<f64> = difference.collect();

@@ -5,8 +5,8 @@
 //! too few rays reach are judged together with their neighbours, in squares of cells, and the size of the squares is reported.
 //!
 //! Guarantee: the same scene, seed and rays give the same bits for any number of threads.
-//! Known weakness: what facets hide from every one of these rays is not seen; the standard error of a difference says how far
-//! rays of this number can show.
+//! Known weakness: a change by facets that none of these rays meets is not seen; the standard error of a difference says how much
+//! rays of this number can resolve.
 
 mod cells;
 mod ends;
@@ -129,7 +129,7 @@ impl GeometricError {
         if self.rays > 0 { emitted / self.rays as f64 } else { 0.0 }
     }
 
-    /// How many of these rays brought a power, of which `emitted` left the sources: of weak rays, as behind a filter, the spread gives it.
+    /// How many of these rays brought a power, of which `emitted` left the sources: for weak rays, as behind a filter, by the spread.
     fn rays_of(&self, power: &Paired, statistical: f64, emitted: f64) -> f64 {
         let by_power = power.spline * self.rays as f64 / emitted.max(f64::MIN_POSITIVE);
         let by_spread = if statistical > 0.0 { (power.spline / statistical).powi(2) } else { 0.0 };
@@ -137,9 +137,9 @@ impl GeometricError {
         by_power.max(by_spread.min(self.rays as f64))
     }
 
-    /// Returns a receiver that so few of these rays came to that a run of `scale` times as many will know its light better than they show
+    /// Returns a receiver that so few of these rays came to that a run of `scale` times as many will know its light better than they know
     /// what facets change of it: one ray in `n` is unseen among `n`, a share of `1/n`, where the run's error is one of `1/√(n·scale)`.
-    /// What bodies absorb is no reason for the spline: nobody asked for that, and its error says how little is known.
+    /// What bodies absorb is no reason for the spline: it is no requested figure, and its error says how little is known.
     pub(in crate::study) fn unjudged(&self, scale: f64, emitted: f64) -> Option<&str> {
         let is_unjudged = |r: &&ReceiverError| self.rays_of(&r.power, r.statistical.power, emitted) < scale;
         self.receivers.iter().find(is_unjudged).map(|r| r.name.as_str())
@@ -280,7 +280,7 @@ impl ReceiverError {
 mod tests {
     use super::*;
 
-    /// A hundred rays show a share of a hundredth at best, which a run of a hundred times as many rays knows as well as by its own; few
+    /// A hundred rays resolve a share of a hundredth at best, which a run of a hundred times as many rays knows as well as by its own; few
     /// that bring little each are as many as their spread says.
     #[test]
     fn a_receiver_that_few_rays_reach_is_not_judged() {

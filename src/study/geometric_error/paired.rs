@@ -1,4 +1,4 @@
-//! A figure of the same rays on facets and on the spline, and the error that replicates give.
+//! A figure of the same rays on facets and on the spline, and the error of both by replicates.
 
 use crate::math::variance_of_sum;
 use serde::{Serialize, Serializer};
@@ -21,7 +21,7 @@ impl Paired {
     /// Returns the geometric error of the figure on facets: its difference from the spline and the standard error of that, added in
     /// quadrature.
     pub fn geometric(&self) -> f64 {
-        // An error indistinguishable from zero is still no smaller than its own uncertainty.
+        // An error that cannot be distinguished from none is still no smaller than its own uncertainty.
         (self.facets - self.spline).hypot(self.error)
     }
 
@@ -37,7 +37,7 @@ impl Paired {
         self.error = self.error.hypot(share * self.spline);
     }
 
-    /// Whether rays can distinguish the difference from none: it is beyond three of its standard errors.
+    /// Whether the difference is significant: it is beyond three of its standard errors.
     pub fn is_significant(&self) -> bool {
         (self.facets - self.spline).abs() > SIGNIFICANT * self.error
     }
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
     use crate::math::error_of_sum;
 
-    /// A difference of less than one ray is none that a ray showed; one of more is known by itself.
+    /// A difference of less than one ray comes from no ray; one of more is known by itself.
     #[test]
     fn a_figure_that_no_ray_changed_is_as_uncertain_as_one() {
         let power = |facets: f64, error: f64| Paired { facets, spline: 3.0, error };

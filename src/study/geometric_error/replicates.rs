@@ -105,7 +105,7 @@ impl Brought {
     }
 }
 
-/// Returns quanta as a word, the largest for more: so much is distinguished from more by no comparison of so few rays.
+/// Returns quanta as a word, the largest for more: no comparison of so few rays distinguishes that from more.
 fn word_of_quanta(quanta: u128) -> u64 {
     u64::try_from(quanta).unwrap_or(u64::MAX)
 }

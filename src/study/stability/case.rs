@@ -125,7 +125,7 @@ impl Variant {
     }
 }
 
-/// A case in one variant, ready to be asked.
+/// A case in one variant, ready to be traced.
 pub struct Scene<'a> {
     /// The case.
     pub case: &'a Case,
@@ -159,7 +159,7 @@ impl Case {
         let mesh = if self.loops.is_empty() {
             sample_models::grid_mesh(&model, self.divisions)
         } else {
-            // The plain mesher knows no trims, so that such a case is asked of the spline alone.
+            // The plain mesher knows no trims, so that such a case is traced on the spline alone.
             for face in model.parts.iter_mut().flat_map(|p| &mut p.shells).flat_map(|s| &mut s.faces) {
                 face.loops.clone_from(&self.loops);
             }

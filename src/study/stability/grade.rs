@@ -1,4 +1,4 @@
-//! Grades for an intersector: each question of a case is asked, and the answer held against the known truth.
+//! Grades for an intersector: each query of a case is made, and the answer compared with the known truth.
 
 use super::case::{Geometry, Question, Scene, Truth};
 use crate::intersect::{Certainty, Cost, Hit, Intersector};
@@ -42,7 +42,7 @@ pub struct Row {
     pub variant: String,
     /// Name of the intersector.
     pub intersector: String,
-    /// Rays or paths asked.
+    /// Rays or paths traced.
     pub rays: u64,
     /// Right answers.
     pub right: u64,
@@ -53,7 +53,7 @@ pub struct Row {
 }
 
 impl Scene<'_> {
-    /// Asks an intersector every question and counts the grades; a trimmed case asks facets none.
+    /// Makes every query on an intersector and counts the grades; a trimmed case makes none on facets.
     pub fn ask(&self, name: &str, intersector: &dyn Intersector, geometry: Geometry) -> Row {
         let mut row = Row {
             case: self.case.name.into(),
@@ -120,7 +120,7 @@ impl Scene<'_> {
     }
 }
 
-/// Who is asked, and by how much facets may be off.
+/// The intersector under test, and by how much facets may be off.
 struct Grader<'a> {
     scene: &'a Scene<'a>,
     intersector: &'a dyn Intersector,
@@ -179,7 +179,7 @@ impl Grader<'_> {
         hit.t / self.scene.frame.scale
     }
 
-    /// Grades a first hit of a ray, given in the case and as it was asked, by what is promised on the spline or on facets.
+    /// Grades a first hit of a ray, given as in the case and as traced, by what is promised on the spline or on facets.
     fn grade_first(&self, [ray, asked]: [&Ray; 2], truth: &Truth, hit: Option<&Hit>) -> Grade {
         match self.geometry {
             Geometry::Spline => self.first_on_spline([ray, asked], truth, hit),
@@ -188,7 +188,7 @@ impl Grader<'_> {
         }
     }
 
-    /// Grades a first hit on the spline of a ray, given in the case and as it was asked: right to the last digits, or flagged where it says
+    /// Grades a first hit on the spline of a ray, given as in the case and as traced: right to the last digits, or flagged where it says
     /// that it is not proved.
     fn first_on_spline(&self, [ray, asked]: [&Ray; 2], truth: &Truth, hit: Option<&Hit>) -> Grade {
         let resolution = self.scene.resolution(ray, truth.distance());

@@ -1,7 +1,7 @@
 //! Numerical stability: generated models with rays whose right answer is known in closed form.
 //!
 //! Each [`Case`] is one difficulty (grazing rays, poles, knot lines, ratios of weights, cusps, sheets that cross, starts on
-//! the surface, slivers, thin gaps, ten thousand reflections …). Each is asked at home, moved by a kilometre, a thousand times
+//! the surface, slivers, thin gaps, ten thousand reflections …). Each is traced in place, moved by a kilometre, a thousand times
 //! smaller and larger, and turned by an odd angle ([`Variant`]). An answer is *right*, *flagged* (the intersector says that
 //! it is not sure) or *wrong* (in silence).
 //!

@@ -137,7 +137,7 @@ fn slivers_case() -> Case {
     }
 }
 
-/// Makes the case of rays through a gap of air of a micrometre, all crossings asked.
+/// Makes the case of rays through a gap of air of a micrometre, all crossings traced.
 fn gap_case() -> Case {
     // 1 µm of air between two plates.
     let (a, b) = ((Point::ZERO, Point::splat(10.0)), (Point::new(10.001, 0.0, 0.0), Point::new(20.0, 10.0, 10.0)));

@@ -86,7 +86,7 @@ fn graze_case() -> Case {
     ball_case("grazing sphere", questions)
 }
 
-/// Makes the case of rays that cut a ball near its outline, both crossings asked.
+/// Makes the case of rays that cut a ball near its outline, both crossings traced.
 fn silhouette_case() -> Case {
     let question = |i| {
         let mut random = Random::new(3, i);
