@@ -58,9 +58,9 @@ impl Photometer<'_> {
         (0..=steps as usize).map(|k| at(k as f64)).filter(held).collect()
     }
 
-    /// Measures a polygon in directions half an opening apart, as far as the far field holds them, and returns whether it holds all of it,
-    /// to within an opening. The directions are those of a grid from the lowest H and V; along the sides too where that makes more, for
-    /// then the polygon is too narrow for the grid.
+    /// Measures a polygon in directions half an opening apart, as far as the far field holds them, and says whether it holds all of it, to
+    /// within an opening. The directions are those of a grid from the lowest H and V; along the sides too where that makes more, for then
+    /// the polygon is too narrow for the grid.
     pub(super) fn measure_zone(&self, polygon: &[[f64; 2]]) -> (Vec<Sighting>, bool) {
         let (bounds, within) = self.held_bounds(polygon);
         let (mut sightings, complete) = self.measure_grid(polygon, bounds);

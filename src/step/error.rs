@@ -41,7 +41,7 @@ pub enum ErrorKind {
     TooManyPlaced {
         /// Name of the file.
         file: String,
-        /// How many, as far as a 64-bit number can hold.
+        /// How many, up to the largest 64-bit number.
         count: u64,
         /// Most that are placed.
         limit: u64,

@@ -49,7 +49,7 @@ pub(crate) fn read_file(path: &Path) -> Result<(String, Vec<u8>), Error> {
     Ok((formats::file_name(path), bytes))
 }
 
-/// A hash that distinguishes files, the same on every machine.
+/// A hash that identifies files, the same on every machine.
 pub(super) fn hash_bytes(bytes: &[u8]) -> u64 {
     let mut hasher = FxHasher::default();
     hasher.write(bytes);

@@ -95,7 +95,7 @@ fn check_points(points: &[Homogeneous]) -> Result<(), String> {
 pub(super) fn surface(knots: (&KnotVec, &KnotVec), rows: Vec<Vec<Homogeneous>>) -> Result<Surface, String> {
     let knots = [knots.0.iter().copied().collect::<Vec<f64>>(), knots.1.iter().copied().collect()];
     let counts = [rows.len(), rows.first().map_or(0, Vec::len)];
-    // Truck states no degree of a surface: knots and control points do.
+    // Truck gives no degree of a surface: it follows from knots and control points.
     let degree = [0, 1].map(|k| knots[k].len().saturating_sub(counts[k] + 1));
     if counts.contains(&0) || degree.iter().any(|d| *d == 0 || *d > MAX_DEGREE) {
         return Err(format!("a surface of degrees {degree:?}; 1 to {MAX_DEGREE} are supported"));

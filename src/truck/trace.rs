@@ -56,7 +56,7 @@ impl<'a> EdgeTracer<'a> {
         Self { surface, seeds, extent: Uv::new(u1 - u0, v1 - v0), size }
     }
 
-    /// Returns the uv curve of an edge, over the edge's own parameters; `near_u` distinguishes two sides of a seam, `None` where there is
+    /// Returns the uv curve of an edge, over the edge's own parameters; `near_u` selects one of two sides of a seam, `None` where there is
     /// none. Fails for edges more than [`ACCEPTED`] off the surface.
     pub(super) fn trace(&self, edge: &Curve, near_u: Option<f64>) -> Result<TracedEdge, String> {
         let [t0, t1] = edge.domain();

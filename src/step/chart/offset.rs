@@ -37,7 +37,7 @@ pub(crate) fn offset(basis: &Chart, distance: f64) -> Option<Chart> {
             } else if radius >= 0.0 {
                 Analytic::Cone { frame, radius, half_angle }
             } else {
-                // Height 0 lies beyond the apex: what is reported of the cone counts from there.
+                // Height 0 lies beyond the apex: the analytic cone starts at the apex.
                 let origin = frame.origin - radius / half_angle.tan() * frame.z;
                 Analytic::Cone { frame: Frame { origin, ..frame }, radius: 0.0, half_angle }
             };

@@ -57,7 +57,7 @@ pub(in crate::step) struct Chart {
     /// Whether the angles of a torus run or begin otherwise than in the file's surface.
     pub(in crate::step) has_other_angles: bool,
     /// Whether the file's surface has every place twice, with opposite normals, as a profile turned about its own axis of symmetry has:
-    /// only how a face's edges run decides which is meant.
+    /// only the direction of a face's edges decides which is meant.
     pub(in crate::step) has_two_normals: bool,
     /// Whether the swept curve of an extrusion or a revolution has the file's own parameter although its weights differ, as a spline of the
     /// file has; a conic that was made into a spline has another.

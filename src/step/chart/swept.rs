@@ -87,7 +87,7 @@ pub(in crate::step) fn profile_distance(frame: &Frame, meridian: &Curve, target:
 /// Returns the plane through the axis that holds a meridian; `None` if there is none, or the meridian lies on the axis.
 pub(super) fn plane(frame: &Frame, meridian: &Curve) -> Option<Plane> {
     let local: Vec<Point> = meridian.points.iter().map(|p| frame.local_point(p.position())).collect();
-    // The plane is best determined by the point that is farthest from the axis.
+    // The point farthest from the axis determines the plane best.
     let far = local.iter().copied().max_by(|a, b| a.x.hypot(a.y).total_cmp(&b.x.hypot(b.y)))?;
     let r = far.x.hypot(far.y);
     let near = PLANE_SHARE * r * r;

@@ -62,7 +62,7 @@ impl CurveUse {
 impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Returns the curve #`id` of the edge `e`, read as `directed`, for this use of it: closed where the edge runs over ends that lie apart
     /// by no more than is bridged between segments, else as it is. Refuses ends farther apart over which the edge runs all the same, as
-    /// `others`, the edges of its part, may tell.
+    /// `others`, the edges of its part, may show.
     pub(super) fn close_for_edge(
         &self,
         e: Entity<'f, 'a>,

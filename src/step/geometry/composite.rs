@@ -275,7 +275,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
     }
 
     /// Reads a composite curve, mm, as one spline, of the highest degree of its segments. These are turned around as in [`Self::segments`]
-    /// and joined as by [`join_segments`], however far apart they are: which joints a part of the curve runs over is for its reader to ask.
+    /// and joined as by [`join_segments`], however far apart they are: its reader checks which joints a part of the curve runs over.
     /// Refuses a curve without segments, one with more than [`MAX_SEGMENTS`], and chains of more than [`MAX_DEPTH`] references, of which
     /// `depth` are behind.
     pub(super) fn composite_curve(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<JoinedCurve> {

@@ -12,17 +12,17 @@ use super::{GeometryReader, Outcome, Refusal};
 use crate::math::Point;
 use crate::nurbs::Curve;
 
-/// What is reported of a line that passes a vertex by.
+/// Problem of a line that passes a vertex by.
 const PASSED_BY: &str = "the line of an edge passes one of its vertices by: it runs between them";
-/// What is reported of an edge whose sense is wrong.
+/// Problem of an edge whose sense is wrong.
 const WRONG_SENSE: &str = "the sense of an edge contradicts its vertices: it runs from the first to the second";
-/// What is reported of an edge whose curve was in pieces.
+/// Problem of an edge whose curve was in pieces.
 const BRIDGED: &str = "segments of the curve of an edge lie apart: straight pieces join them";
-/// What is reported of an edge along whose curve some is there twice.
+/// Problem of an edge along a curve that overlaps itself.
 const CUT: &str = "segments of the curve of an edge overlap: what they have in common is cut off one of them";
-/// What is reported of an edge over the ends of a curve that do not meet.
+/// Problem of an edge over the ends of a curve that do not meet.
 const CLOSED: &str = "the ends of the curve of an edge lie apart: a straight piece joins them";
-/// What is reported of an edge over the ends of a curve that overlap.
+/// Problem of an edge over the ends of a curve that overlap.
 const CLOSED_BY_CUT: &str =
     "the ends of the curve of an edge overlap: what they have in common is cut off one of them";
 /// Longest chain of edges that are parts of edges.
@@ -112,7 +112,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
     }
 }
 
-/// Returns what is reported of an edge that runs over a joint.
+/// Returns the problem of an edge that runs over a joint.
 fn told_of_joint(joint: &Joint) -> &'static str {
     match (joint.is_closing, joint.overlaps) {
         (false, false) => BRIDGED,
@@ -123,9 +123,9 @@ fn told_of_joint(joint: &Joint) -> &'static str {
 }
 
 /// Returns the edge from `p` to `q` along a curve, the whole of it if `closed`; `sense` is whether the edge runs along the curve as the
-/// file names it, which is corrected on an open curve, and reported. A line that passes a vertex by is replaced by the segment between
-/// both; an edge whose vertices coincide has no curve. `None` where nothing of the curve lies between vertices that are apart, or its
-/// numbers are not finite.
+/// file names it, which is corrected on an open curve, and noted. A line that passes a vertex by is replaced by the segment between both;
+/// an edge whose vertices coincide has no curve. `None` where nothing of the curve lies between vertices that are apart, or its numbers
+/// are not finite.
 pub(crate) fn trim_to_vertices(
     directed: &DirectedCurve,
     p: Point,
@@ -134,7 +134,7 @@ pub(crate) fn trim_to_vertices(
     sense: bool,
 ) -> Option<TrimmedEdge> {
     let shape = &directed.shape;
-    // The edge's sense is relative to the curve as the file names it, which may be used backwards itself.
+    // The edge's sense is relative to the curve as the file names it, which may be reversed itself.
     let forward = sense != directed.reversed;
     let (a, b) = if forward { (p, q) } else { (q, p) };
     let (mut ta, mut tb) = (shape.parameter(a), shape.parameter(b));
@@ -218,7 +218,7 @@ fn finish_edge(curve: Curve, forward: bool, p: Point, q: Point) -> Option<Trimme
     if !(b > a) || curve.points.iter().any(|x| !x.is_finite()) {
         return None;
     }
-    // How far the curve's ends miss the vertices is the file's own gap, which the report states.
+    // How far the curve's ends miss the vertices is the file's own gap, which the report gives.
     let gap = (curve.evaluate(a) - p).length().max((curve.evaluate(b) - q).length());
     let extent = curve.bounds().diagonal();
     if extent < EMPTY_EDGE_MM {

@@ -86,7 +86,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
     }
 
     /// Returns the chart of a torus; `stated` is the part of a self-touching one that the file names. Without it the points of the face
-    /// tell, and a face on both parts becomes a surface of revolution. Refuses radii that leave no surface.
+    /// decide, and a face on both parts becomes a surface of revolution. Refuses radii that leave no surface.
     ///
     /// With C + (R + r·cos v)·e(u) + r·sin v·z the normal Su × Sv is R + r·cos v times the vector from the tube's middle: a negative r
     /// shifts v by half a turn and leaves the normal, R below −|r| makes the torus of |R| with its normal inwards.
@@ -130,14 +130,14 @@ enum TorusRegion {
     Both,
 }
 
-/// Tells on which part of a self-touching torus (radii in mm) points lie; the apple where none decides.
+/// Returns on which part of a self-touching torus (radii in mm) points lie; the apple where none decides.
 fn torus_region(frame: &Frame, major: f64, minor: f64, points: &[Point]) -> TorusRegion {
     let off = |center: f64, p: &Point| {
         let q = frame.local_point(*p);
         ((q.x.hypot(q.y) - center).hypot(q.z) - minor).abs()
     };
     let near = TORUS_REGION_SHARE * minor;
-    // Points on the circles where the parts meet say nothing.
+    // Points on the circles where the parts meet decide nothing.
     let only = |a: f64, b: f64| points.iter().any(|p| off(a, p) < near && off(b, p) > near);
     match (only(major, -major), only(-major, major)) {
         (true, true) => TorusRegion::Both,

@@ -1,4 +1,4 @@
-//! Where a face is: what says how much of an unbounded curve, and which side of an axis, its surface needs.
+//! Where a face is: this decides how much of an unbounded curve, and which side of an axis, its surface needs.
 
 use crate::math::{Aabb, Point};
 

@@ -13,7 +13,7 @@ const SAMPLES: i32 = 256;
 
 /// Cuts a meridian where it crosses the axis, and returns the part nearest to the points of the face; the whole one where that fits as well
 /// as any, or nothing crosses. Of two parts that fit alike it is the one that comes first on the curve, and the other its twin: whether
-/// there is one is reported beside it.
+/// there is one is returned too.
 pub(crate) fn keep_face_side_of_axis(frame: &Frame, curve: Curve, reach: FaceExtent<'_>) -> (Curve, bool) {
     let mut parts = split_at_axis(frame, &curve);
     let sides = parts.len();
@@ -121,7 +121,7 @@ mod tests {
         let on = |z: f64| Point::new((328f64.powi(2) - (z + 29.0).powi(2)).sqrt(), -306.0, z);
         for z in [[0.6, 3.15], [-0.6, -3.15]] {
             let points = z.map(on);
-            // The middle of ring-shaped faces is on the axis and says nothing.
+            // The middle of ring-shaped faces is on the axis and decides nothing.
             let reach = FaceExtent {
                 center: Point::new(327.0, -306.0, 0.0),
                 radius: 3.2,

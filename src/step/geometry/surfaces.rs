@@ -122,7 +122,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         let (Some(ku), Some(kv)) = knots else {
             return Err(Refusal::new(e, "knots and multiplicities do not fit"));
         };
-        // Equal weights divide out: such a surface is described as a plain B-spline.
+        // Equal weights divide out: such a surface is reported as a plain B-spline.
         let rational =
             weights.as_ref().is_some_and(|w| w.iter().any(|x| (x - w[0]).abs() > EQUAL_WEIGHTS * w[0].abs()));
         let (surface, _) = sanitise::surface(degree, [ku, kv], [nu, nv], &points, weights.as_deref())

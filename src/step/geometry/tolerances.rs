@@ -73,7 +73,7 @@ pub(super) const COPLANAR_MM: f64 = 1e-9;
 pub(super) const PARALLEL_AXIS: f64 = 1e-9;
 /// A product of two axes whose part across the space's Z is below this is that Z or its opposite: directions in files have six digits.
 pub(super) const UPRIGHT_AXIS: f64 = 1e-6;
-/// A unit vector whose part across the axis is below this runs along it and shows no side.
+/// A unit vector whose part across the axis is below this runs along it and gives no side.
 pub(super) const STEEP_RADIUS: f64 = 1e-6;
 
 /// A place of a profile this share of the largest radius squared from the axis, times that radius, is on it.

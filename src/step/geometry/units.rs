@@ -138,7 +138,7 @@ fn unit_factor(unit: Entity<'_, '_>, depth: usize) -> Option<(Kind, f64, String)
     } else {
         None
     };
-    // The file's own definition counts; a name is asked only where it has none.
+    // The file's own definition counts; a name is used only where it has none.
     let by_measure = || {
         let with_unit = conversion.entity(1)?;
         let args = with_unit

@@ -125,7 +125,7 @@ impl<'a> File<'a> {
         self.entities_of_kind(|name| names.contains(&name))
     }
 
-    /// Returns the instances with a record whose name is meant, in the order of the file; each name is asked about once.
+    /// Returns the instances with a record whose name is meant, in the order of the file; each name is tested once.
     pub(super) fn entities_of_kind(&self, is_meant: impl Fn(&str) -> bool) -> impl Iterator<Item = Entity<'_, 'a>> {
         let positions = self.kinds.positions(|name| std::str::from_utf8(name).is_ok_and(&is_meant));
         positions.into_iter().map(|position| self.instance(position as usize))

@@ -40,7 +40,7 @@ pub(crate) fn external_files(file: &File<'_>, own: &str) -> Vec<Note> {
 }
 
 /// Names the sets of points, curves and surfaces that list faces, which they do not hold: these are left out. Those that a shell among the
-/// `placed` items lists stand, or are reported, by that.
+/// `placed` items lists stand, or are reported, with that shell.
 pub(crate) fn faces_in_sets(file: &File<'_>, placed: impl Iterator<Item = u64>) -> Vec<Note> {
     let is_face = |id: &u64| file.entity(*id).is_some_and(|e| e.is_one_of(&["ADVANCED_FACE", "SUBFACE"]));
     let mut sets: Vec<(Entity<'_, '_>, Vec<u64>)> = Vec::new();

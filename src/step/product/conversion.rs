@@ -170,7 +170,7 @@ fn edge_curve(geometry: &GeometryReader<'_, '_>, key: EdgeKey, context: EdgeCont
 }
 
 /// Whether points of the edges are needed to choose the part of a surface that is meant: of every kind but planes, cylinders, cones,
-/// spheres and B-splines, recognised by keyword alone.
+/// spheres and B-splines, by keyword alone.
 fn is_sized_by_edges(file: &File<'_>, surface: u64) -> bool {
     let simple = ["PLANE", "CYLINDRICAL_SURFACE", "CONICAL_SURFACE", "SPHERICAL_SURFACE", "B_SPLINE_SURFACE"];
     let known = |k: &str| simple.iter().any(|s| k.starts_with(s));
@@ -183,7 +183,7 @@ fn is_in_reach(surface: &Surface) -> bool {
     bounds.min.abs().max(bounds.max.abs()).max_element() <= FARTHEST_MM
 }
 
-/// Makes the refusal of a face whose surface reaches farther than numbers resolve places.
+/// Makes the refusal of a face whose surface reaches beyond the resolution of numbers.
 fn beyond_rounding(geometry: &GeometryReader<'_, '_>, id: u64, plan: &FacePlan) -> Refusal {
     let surface = geometry.file.entity_name(plan.surface);
     let reason = format!(

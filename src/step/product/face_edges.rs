@@ -45,7 +45,7 @@ pub(super) fn face_edges<'e>(
             let k = index[key];
             let edge = edges[k].as_ref()?;
             found.repairs.extend(edge.repair.filter(|r| !found.repairs.contains(r)));
-            // The widest gap between an edge and its vertices says how loosely points of this face hold together.
+            // The widest gap between an edge and its vertices shows how loosely points of this face hold together.
             found.gap = found.gap.max(edge.gap);
             let Some(curve) = &edge.curve else { continue };
             found.bounds = found.bounds.union(curve.bounds());

@@ -13,7 +13,7 @@ use crate::math::Frame;
 use crate::step::part21::Entity;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-/// What CONTEXT_DEPENDENT_SHAPE_REPRESENTATIONs state besides the placements of usages.
+/// What CONTEXT_DEPENDENT_SHAPE_REPRESENTATIONs give besides the placements of usages.
 #[derive(Default)]
 pub(super) struct ContextualPlaces {
     /// The relationships that are those of usages.
@@ -231,8 +231,8 @@ impl<'f, 'a> Assembly<'f, 'a> {
         }
     }
 
-    /// Returns the mapped items of a usage's own shape that show its child, and where each puts it in the parent; `None`, which is
-    /// reported, where that cannot be read.
+    /// Returns the mapped items of a usage's own shape that show its child, and where each puts it in the parent; `None`, which is noted,
+    /// where that cannot be read.
     fn mapped_occurrences(&mut self, usage: u64, shape: u64) -> Vec<(u64, Option<Frame>)> {
         let child = self.file.entity(usage).and_then(usage_attributes).and_then(|a| a.id(4));
         let Some(child) = child else { return Vec::new() };

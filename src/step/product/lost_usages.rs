@@ -1,4 +1,4 @@
-//! Usages that are referred to but are not in the file: their relationships still say where a component stands, and in which product.
+//! Usages that are referred to but are not in the file: their relationships still give the place of a component and its product.
 
 use super::assembly::Assembly;
 use super::open_usages::{OpenUsages, PlacedBy};
@@ -8,7 +8,7 @@ use super::usage_names::{Usage, UsagePlacement};
 use crate::step::part21::Entity;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-/// A usage that is not in the file, as its relationship describes it.
+/// A usage that is not in the file, as far as its relationship gives it.
 pub(super) struct LostUsage {
     /// The CONTEXT_DEPENDENT_SHAPE_REPRESENTATION that refers to it.
     by: u64,
@@ -27,8 +27,8 @@ fn absence(what: &str, id: Option<u64>) -> String {
 
 impl<'f, 'a> Assembly<'f, 'a> {
     /// Returns the usage that a CONTEXT_DEPENDENT_SHAPE_REPRESENTATION means whose relationship or usage is not in the file, where the
-    /// representations of the relationship are those of two products; else `None`, which is reported. `used` are the relationships of
-    /// usages that are there.
+    /// representations of the relationship are those of two products; else `None`, which is noted. `used` are the relationships of usages
+    /// that are there.
     pub(super) fn lost_usage(
         &mut self,
         e: Entity<'f, 'a>,

@@ -4,7 +4,7 @@
 //! `usage_ends`, `open_usages`, `lost_usages` and `subassemblies`; `walk` with `places`, `placed_children`, `orphans` and `placed_count`;
 //! `shared_items` and `pictures` say which of their items, `asides` what a viewer would not show); a representation is shells of faces
 //! (`topology`, with loops put in order by `swapped_vertices`, `face_edges` and `loop_order`, what has no extent left out by `zero_width`
-//! and `spikes`, what is there twice by `repeated_faces`; `shells` are turned by `orientation` and split by `shell_pieces`), surfaces
+//! and `spikes`, what is there twice by `repeated_faces`; `shells` are turned by `orientation` and separated by `shell_pieces`), surfaces
 //! without a face and ready meshes (`free_surfaces`, `tessellated`), solids given as recipes (`solid_recipes`, `recipe_parts`); all of it
 //! with its colours and layers (`styles`) becomes one part (`numbering`, `conversion`).
 

@@ -27,7 +27,7 @@ const EDGE_OF_THIN: usize = 24;
 
 /// Returns the indices of faces, ascending, whose sense contradicts their neighbours'. In each set of faces joined by edges that two of
 /// them use, faces fall into two groups that contradict each other along all edges between them; the smaller one is returned. None of a set
-/// whose edges give no two groups (a Möbius band) or groups of one size. Whether all look inwards is not decided.
+/// whose edges give no two groups (a Möbius band) or groups of one size. Whether all look inwards is not decided here.
 pub(crate) fn faces_against_neighbours(faces: &[Face]) -> Vec<usize> {
     // For each edge the faces that use it and whether they run along it.
     let mut uses: FxHashMap<EdgeId, Vec<(usize, bool)>> = FxHashMap::default();
@@ -74,7 +74,7 @@ pub(crate) fn faces_against_neighbours(faces: &[Face]) -> Vec<usize> {
             next += 1;
         }
         let count = group.iter().filter(|(_, turned)| *turned).count();
-        // By majority; that the whole shell may look inwards is shown by its volume.
+        // By majority; whether the whole shell looks inwards is decided by its volume.
         if is_consistent && 2 * count != group.len() {
             let fewer = 2 * count < group.len();
             out.extend(group.into_iter().filter(|(_, turned)| *turned == fewer).map(|(k, _)| k));

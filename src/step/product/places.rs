@@ -132,7 +132,7 @@ impl PlaceTable {
     /// Returns the entries of a thing, with their numbers, of which one could be the same place: of ten thousand places of one screw few.
     fn abreast(&self, thing: u64, place: &Place) -> Option<impl Iterator<Item = (usize, &Place)>> {
         let classes = self.classes.get(&thing)?;
-        // What is too far out for a number is refused by those who ask.
+        // Callers refuse what is too far out for a number.
         let along = Some(place.sorting_position()).filter(|along| along.is_finite())?;
         let rounding = place.rounding;
         Some(classes.iter().flat_map(move |&RoundingClass { class, widest }| {

@@ -24,7 +24,7 @@ pub(super) fn is_shape_representation(keyword: &str) -> bool {
         && !keyword.contains("_RELATIONSHIP")
 }
 
-/// Whether one of these items is a ready mesh, recognised by its name.
+/// Whether one of these items is a ready mesh, by its keyword.
 pub(super) fn holds_mesh(file: &File<'_>, items: &[u64]) -> bool {
     let mesh = |k: &str| k.contains("TRIANGULATED") || k.starts_with("TESSELLATED");
     items.iter().any(|i| file.entity(*i).is_some_and(|e| e.keywords().any(mesh)))

@@ -1,4 +1,4 @@
-//! What the edges of a shell show: whether it is closed, and whether it is several shells that share no edge.
+//! Analysis of a shell by its edges: whether it is closed, and whether it is several shells that share no edge.
 //!
 //! Some exporters list the faces of bodies that touch, or are apart, as one closed shell: light goes from one body into the next only
 //! where these are two. A piece within another one that looks the other way is a void; boxes show what may be within. Shells whose faces
@@ -46,7 +46,7 @@ enum PieceRole {
     Solid,
     /// A void of the solid whose outer piece is this one.
     VoidOf(usize),
-    /// Nothing decides: it stays in the shell of that piece.
+    /// Undecided: it stays in the shell of that piece.
     PartOf(usize),
 }
 
@@ -166,7 +166,7 @@ fn piece_roles(pieces: &[Vec<Face>]) -> Vec<PieceRole> {
     let mut by_size: Vec<usize> = (0..pieces.len()).collect();
     by_size.sort_by(|&a, &b| boxes[b].diagonal().total_cmp(&boxes[a].diagonal()));
     let mut roles = vec![PieceRole::Solid; pieces.len()];
-    // Asked once of each: a body may have thousands of pieces in its box, and to ask it takes hundreds of points on each face.
+    // Computed once for each: a body may have thousands of pieces in its box, and each takes hundreds of points on each face.
     let mut known: Vec<Option<Option<bool>>> = vec![None; pieces.len()];
     let mut looks = |piece: usize| *known[piece].get_or_insert_with(|| looks_inwards(&pieces[piece]));
     for (rank, &k) in by_size.iter().enumerate() {

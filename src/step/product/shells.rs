@@ -1,4 +1,4 @@
-//! Faces into shells, and shells into solids, as their plans say; what cannot be as a plan says is mended and reported.
+//! Faces into shells, and shells into solids, as their plans say; what cannot be as a plan says is repaired and reported.
 
 use super::numbering::{ConvertedPart, repair_note};
 use super::orientation::{FaceBoxes, faces_against_neighbours, is_inside_out};
@@ -46,7 +46,7 @@ pub(super) fn add_shells(
             face.layer = face.layer.or_else(|| layer.clone());
             own.push(face);
         }
-        // Only a whole shell shows by its volume which way it faces.
+        // Only for a whole shell does the volume decide which way it faces.
         let is_whole = plan.whole && own.len() == plan.faces.len();
         removed.extend(mend_faces(geometry, &mut own, part, out));
         if plan.void {

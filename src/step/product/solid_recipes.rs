@@ -293,7 +293,7 @@ fn extrude(profile: Profile, by: Vector) -> Option<SolidRecipe> {
 /// Returns the solid of a profile turned about the z axis of a frame by an angle, radians; from nearly 2π on a whole turn without caps.
 /// `None` when the profile is turned within its own plane.
 fn revolve(profile: Profile, axis: &Frame, angle: f64) -> Option<SolidRecipe> {
-    // Which way the profile sets out is determined by the middle of the curve that is farthest from the axis.
+    // Which way the profile sets out is decided by the middle of the curve that is farthest from the axis.
     let points: Vec<Point> =
         profile.loops.iter().flatten().map(|c| c.evaluate(0.5 * (c.domain()[0] + c.domain()[1]))).collect();
     let far = points.into_iter().max_by(|a, b| axis_distance(axis, *a).total_cmp(&axis_distance(axis, *b)))?;

@@ -20,7 +20,7 @@ pub(super) struct ProductLink {
     /// The representations of both.
     pub(super) holder: u64,
     pub(super) shown: u64,
-    /// `None` where the mapped item states it.
+    /// `None` where the mapped item gives it.
     pub(super) placement: Option<Frame>,
 }
 

@@ -1,4 +1,4 @@
-//! Arcs whose vertices the file has in the wrong order, recognised by the loops that run along them.
+//! Arcs whose vertices the file has in the wrong order, detected by the loops that run along them.
 //!
 //! The same two vertices bound both parts of a circle, and their order decides which one is meant. Where it is wrong, both faces beside the
 //! arc find it against their neighbours; where the flag of one use is wrong, one does.

@@ -82,7 +82,7 @@ pub(crate) struct ShapeItems {
     pub(crate) shells: Vec<ShellPlan>,
     /// Surfaces without a face: CURVE_BOUNDED_SURFACE and bare surfaces of geometric sets.
     pub(crate) surfaces: Vec<u64>,
-    /// The same, to recognise what is listed again: a set of 200,000 took seven seconds to search.
+    /// The same as a set, to find what is listed again: a set of 200,000 took seven seconds to search.
     listed_surfaces: FxHashSet<u64>,
     /// Solids given as a recipe.
     pub(crate) recipes: Vec<u64>,
@@ -279,7 +279,7 @@ fn is_unsupported_shape(keyword: &str) -> bool {
         || keyword.contains("TRIANGULATED")
 }
 
-/// Whether an entity is a surface, recognised by its name.
+/// Whether an entity is a surface, by its keyword.
 pub(crate) fn is_surface(e: Entity<'_, '_>) -> bool {
     e.keywords().any(|k| {
         k.ends_with("_SURFACE")
@@ -303,7 +303,7 @@ pub(crate) fn read_face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
         let Some(parent) = owner.attributes("SUBFACE", 2).and_then(|a| a.entity(0)) else { break };
         owner = parent;
     }
-    // The sense is reported where the surface is named, which for a part of a face is its parent.
+    // The sense stands where the surface is named, which for a part of a face is its parent.
     let (surface, sense) = if owner.keyword().is_empty() {
         let own = owner.attributes("FACE_SURFACE", 0);
         (own.and_then(|a| a.id(0)), own.and_then(|a| a.flag(1)))

@@ -64,7 +64,7 @@ pub(super) struct ProductsAbove {
     users: Vec<Vec<usize>>,
 }
 
-/// A product and a component, of which is asked whether the one uses the other; in order of the component.
+/// A query whether a product uses a component; in order of the component.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct NumberedPair {
     /// The number of the component.

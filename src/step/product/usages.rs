@@ -28,7 +28,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         usages
     }
 
-    /// Leaves out promises that are kept, where other usages below the same assembly use the component, which is reported of one that has a
+    /// Leaves out promises that are kept, where other usages below the same assembly use the component, which is noted for one that has a
     /// place; and those without a place of what is used anywhere else.
     fn leave_out_promises(&mut self, usages: &mut FxHashMap<u64, Vec<Usage>>) {
         let file = self.file;

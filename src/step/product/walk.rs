@@ -26,7 +26,7 @@ struct Walk<'f, 'a> {
     limit: u64,
     reached: FxHashSet<u64>,
     in_orphans: bool,
-    /// Entities of which a problem is reported already.
+    /// Entities with a problem that is already reported.
     told: FxHashSet<u64>,
     /// What products reach; orphans do not place it again.
     by_products: FxHashSet<u64>,

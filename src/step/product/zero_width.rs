@@ -165,7 +165,7 @@ fn two_edges(
 ) -> Option<[(usize, bool); 2]> {
     let uses = plan.loops.iter().flatten().map(|(key, reversed)| (index[key], *reversed));
     let has_length = |(edge, _): &(usize, bool)| !matches!(&edges[*edge], Ok(TrimmedEdge { curve: None, .. }));
-    // One more than is wanted stands for all the others.
+    // One more than is wanted shows that there are others.
     let found: Vec<(usize, bool)> = uses.filter(has_length).take(3).collect();
     let both: [(usize, bool); 2] = found.try_into().ok()?;
     (both[0].0 != both[1].0).then_some(both)

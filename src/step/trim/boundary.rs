@@ -107,7 +107,7 @@ fn add_with_holes(outer: Chain, holes: impl IntoIterator<Item = Chain>, chart: &
 }
 
 /// Adds loops that wind around nothing, with these polygons, to `out`: the largest is the outer one, except on a closed surface, where
-/// loops that all run clockwise leave the rest of the surface as the face, and one that bounds as much either way says nothing.
+/// loops that all run clockwise leave the rest of the surface as the face, and one that bounds as much either way decides nothing.
 fn bound_without_winding(
     mut plain: Vec<Chain>,
     polygons: &[Vec<Uv>],

@@ -28,7 +28,7 @@ pub(super) fn cancelling_lobes(chain: &Chain, polygon: &[Uv]) -> Option<f64> {
     let area = chain.area().abs();
     let [lo, hi] = bounds(polygon);
     let around = (hi - lo).element_product();
-    // Most loops are decided at once.
+    // Most loops are classified at once.
     if area > CANCELLED_SHARE * around {
         return None;
     }

@@ -80,7 +80,7 @@ impl<'o> Obstacles<'o> {
         Self { holes, borders, displacement, chains, along, runs, tree, hole_tree, steps: Cell::new(0) }
     }
 
-    /// Returns how many boxes and sides were looked at since this was last asked: the measure of a search's work.
+    /// Returns how many boxes and sides were tested since the last call: the measure of a search's work.
     pub(super) fn take_steps(&self) -> u64 {
         self.steps.take()
     }
@@ -95,7 +95,7 @@ impl<'o> Obstacles<'o> {
         !self.any_beside(from, to, |_, is_crossed| is_crossed())
     }
 
-    /// Returns the holes, and copies of them, that a way through these places crosses; some may be listed more than once.
+    /// Returns the holes, and copies of them, that a way through these places crosses; some may be returned more than once.
     pub(super) fn crossed_by(&self, places: &[Uv]) -> Vec<HoleCopy> {
         let mut crossed = Vec::new();
         for side in places.windows(2) {

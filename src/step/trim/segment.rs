@@ -8,7 +8,7 @@ use crate::math::polygon::{is_inside_sides, polygon_sides};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Contact {
     Apart,
-    /// One ends on the other, or they lie on one line: which side of a polygon the line is on before and after is unknown.
+    /// One ends on the other, or they lie on one line: the side of a polygon before and after the contact is not known.
     Touching,
     Crossing,
 }

@@ -45,7 +45,7 @@ pub(super) const SEAM_LENGTH_WEIGHT: f64 = 1e-3;
 pub(super) const WIDE_STEP: f64 = 0.2;
 /// A step along a pole below this, relative to its coordinates, is none.
 pub(super) const EMPTY_STEP: f64 = 1e-9;
-/// Least distance that can separate a point from a pole, mm.
+/// Least distance that separates a point from a pole, mm.
 pub(super) const POLE_RESOLUTION_MM: f64 = 1e-9;
 /// A turn about a pole this share of a period short of a whole one is whole: the azimuth at a pole is extrapolated
 /// from two places beside it, which is less exact than a foot point.

@@ -100,7 +100,7 @@ impl<'s> Visibility<'s> {
             |met: &MetHole| segment.may_meet(met.bounds) && self.obstacles.hole_is_crossed(met.hole, ends);
         let crossed = others.iter().position(is_crossed);
         self.obstacles.count_steps(crossed.map_or(others.len(), |k| k + 1) as u64);
-        // Borders are asked last: what is barred is nearly always barred by a hole.
+        // Borders are tested last: what is barred is nearly always barred by a hole.
         crossed.is_none() && (past.is_some() || self.borders.leave_free(ends[0], ends[1]))
     }
 }

@@ -189,7 +189,7 @@ impl Search<'_> {
             for (corner, next) in nodes[self.starts.len()..].iter_mut().enumerate() {
                 let length = so_far + self.length(place, next.place);
                 let leg = Leg { from: i, to: Some(corner), ends: [place, next.place] };
-                // What is cheap to ask comes first.
+                // Cheap tests come first.
                 if !next.settled && length < next.length.min(longest) && is_free(&leg) {
                     next.length = length;
                     next.before = Some(i);
