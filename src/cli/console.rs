@@ -153,8 +153,8 @@ impl Console {
         bar
     }
 
-    /// Returns a progress bar of length [`STAGE_STEPS`] for a work that reports its stages and remaining time; hidden with `--quiet` and
-    /// off a terminal.
+    /// Returns a progress bar of length [`STAGE_STEPS`] for a job that reports its stages and remaining time; hidden with `--quiet` and off
+    /// a terminal.
     pub(crate) fn stage_bar(&self, label: &str) -> ProgressBar {
         let bar = ProgressBar::new(STAGE_STEPS);
         if !self.terminal || self.quiet {

@@ -113,7 +113,7 @@ fn say(message: &'static str) {
 #[cfg(not(unix))]
 pub(crate) fn watch() {}
 
-/// Whether whoever started the command asked that the signal be ignored, as `nohup` does; known on Linux alone.
+/// Whether the command was started with the signal ignored, as by `nohup`; known on Linux alone.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let Ok(status) = std::fs::read_to_string("/proc/self/status") else { return false };

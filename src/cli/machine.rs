@@ -1,4 +1,4 @@
-//! What the machine is, as far as the system reports it: processor, cores, memory, name.
+//! The machine, as far as the system reports it: processor, cores, memory, name.
 
 use crate::formats::file_stem;
 use crate::simulate::machine_threads;
@@ -9,7 +9,7 @@ use std::time::SystemTime;
 /// As the system counts memory.
 const KILOBYTES_PER_GB: f64 = 1_000_000.0;
 
-/// Describes processor, number of cores, memory and system in words, as far as the system reports it.
+/// Describes processor, number of cores, memory and system in words, as far as the system reports them.
 pub(crate) fn hardware() -> String {
     let cores = machine_threads();
     let cpu = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| field_value(&text, "model name"));

@@ -18,12 +18,12 @@ pub(super) struct Outline {
     /// One for each loop, which closes by itself.
     pub(super) polygons: Vec<Vec<Uv>>,
     domain: [[f64; 2]; 2],
-    /// Of the polygons, once it is asked: some thousand places of a thread, each compared with all sides of its border, took ten seconds.
+    /// Of the polygons, built on first use: some thousand places of a thread, each compared with all sides of its border, took ten seconds.
     enclosure: OnceCell<Enclosure>,
 }
 
 impl Outline {
-    /// Follows every loop by a polygon, fine enough to separate inside from outside but near the trims.
+    /// Follows every loop by a polygon, fine enough to separate inside from outside except near the trims.
     pub(super) fn new(face: &Face) -> Self {
         // A straight use is its two ends.
         let pieces = |span: &UseSpan<'_>| match span.curve.degree {

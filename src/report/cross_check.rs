@@ -158,7 +158,7 @@ pub fn unexplained(check: &CrossCheck) -> String {
     }
 }
 
-/// Makes a table of all counts of ray segments: asked, hit, answered differently, explained by which cause, proved.
+/// Makes a table of all counts of ray segments: checked, hit, answered differently, explained by which cause, proved.
 pub(super) fn count_table(check: &CrossCheck) -> Table {
     let (f, e) = (&check.facets_vs_exact, &check.facets_vs_exact.explained);
     let mut table =

@@ -41,7 +41,7 @@ pub(super) enum Element {
 /// Shapes on a surface of some size, the first at the bottom.
 #[derive(Clone, Debug)]
 pub(super) struct Drawing {
-    /// What readers of the report that cannot see it are given.
+    /// The alternative text for readers who cannot see it.
     pub(super) title: String,
     pub(super) size: Place,
     pub(super) elements: Vec<Element>,

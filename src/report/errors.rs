@@ -11,7 +11,7 @@ use crate::study::geometric_error::{GeometricError, Paired, ReceiverError};
 use crate::study::model_figures::PowerFigures;
 use crate::text::{figures, grouped};
 
-/// Share of a value below which its error is that of rounding, and not reported.
+/// Share of a value below which its error is that of rounding, and not worth reporting.
 const ROUNDING_SHARE: f64 = 1e-9;
 
 /// Whether an error is no more than what rounding leaves of a value.
@@ -56,7 +56,7 @@ pub(super) fn with_errors(figure: &Figure, digits: usize, cause: GeometricCause,
     told
 }
 
-/// Channels whose totals a sentence gives; of more the table does.
+/// Most channels whose totals a sentence states; more are left to the table.
 const SPOKEN_CHANNELS: usize = 6;
 
 /// Writes the totals of a receiver's further channels, in parentheses, six at most; nothing where there are none.

@@ -19,7 +19,7 @@ pub(super) type PngOf<'a> = &'a dyn Fn(&View) -> Result<Vec<u8>, String>;
 /// Stands for the scripts until the rest of the page is made; no text of a report can hold it, because its marks are escaped there.
 const SCRIPTS_GO_HERE: &str = "<!--scripts-->";
 
-/// Writes the browser's policy: nothing may be loaded from anywhere, and no script may run but these, which it knows by their hash
+/// Writes the policy for the browser: nothing may be loaded from anywhere, and no script may run but these, which it knows by their hash
 /// (Content Security Policy Level 3, 2.3.1); text never becomes code.
 fn policy(scripts: &[&str]) -> String {
     let hash = |script: &&str| format!("'sha256-{}'", base64(&Sha256::digest(script.as_bytes())));
@@ -189,7 +189,7 @@ fn table_markup(table: &Table) -> Markup {
 /// Commands of a merged run's parts that the page shows: of a thousand parts each has its own.
 const SHOWN_COMMANDS: usize = 8;
 
-/// Writes the section with command, program, machine and seed.
+/// Writes the section that states command, program, machine and seed.
 fn provenance_markup(p: &Provenance) -> Markup {
     let seed = p.seed.map_or("none used".to_owned(), |s| s.to_string());
     let further = p.traced_by.len().saturating_sub(SHOWN_COMMANDS);

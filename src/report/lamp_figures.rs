@@ -227,7 +227,7 @@ mod tests {
         let receiver = &results.receivers[0];
         let grid = super::super::receiver_grid(receiver).unwrap();
         let chart = encircled_power(receiver, &grid).unwrap();
-        // Half of the light lies nearer than a cell is long, as little as these few show.
+        // Half of the light lies nearer than a cell is long, as coarse as these few are.
         assert!(chart.caption.contains("few cells"), "{}", chart.caption);
         let Content::Series(series) = chart.content else { panic!("a curve") };
         assert_eq!(series[0].points[0], [0.0; 2]);

@@ -171,7 +171,7 @@ pub(super) fn cuts(grid: &Grid) -> Option<Chart> {
 
 /// Returns the standard error of the largest value, in its unit: that of the receiver's figure `max` where that has the unit of the grid,
 /// else the statistical one with the upward bias of a noisy maximum ([`error_of_maximum`]) and the geometric one of its cell, as squares;
-/// `None` without statistical errors. `grid` has even poles, which `rings` lists.
+/// `None` without statistical errors. `rings` are the even poles of `grid`.
 pub(super) fn peak_error(grid: &Grid, rings: &PoleRings, max: Option<&Figure>) -> Option<f64> {
     if let Some(max) = max.filter(|max| unit_in_words(&max.unit) == grid.unit) {
         return Some(max.combined());

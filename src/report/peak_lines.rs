@@ -13,7 +13,7 @@ const QUARTER_DEG: f64 = 90.0;
 pub(super) struct Line {
     /// Which way it runs: `along H`, `in the plane C 5°`.
     pub name: String,
-    /// Where it crosses the other axis: ` at V = 3°`; empty for a plane, which its name gives.
+    /// Where it crosses the other axis: ` at V = 3°`; empty for a plane, whose name says it.
     pub place: String,
     /// Distance of two of its cells, in units of its axis.
     pub step: f64,

@@ -50,7 +50,7 @@ fn axis(label: &str, unit: &str, range: [f64; 2], step: f64) -> Axis {
     Axis { label: label.into(), unit: unit.into(), range, cells: ((range[1] - range[0]) / step).round() as usize }
 }
 
-/// Makes a map of lux over the cells of two axes: `value` is asked at the middle of each.
+/// Makes a map of lux over the cells of two axes: `value` is sampled at the middle of each.
 fn chart(name: &str, title: &str, caption: &str, axes: [Axis; 2], value: impl Fn(f64, f64) -> f64) -> Chart {
     let values = (0..axes[1].cells)
         .flat_map(|j| (0..axes[0].cells).map(move |i| (i, j)))

@@ -46,7 +46,7 @@ pub struct SimulationReport<'a> {
     pub drawn: String,
     /// Unit of powers: `W` or `lm`.
     pub unit: &'static str,
-    /// The same rays asked of octree, BVH and spline.
+    /// The cross-check: the same rays on octree, BVH and spline.
     pub check: Option<&'a CrossCheck>,
     /// Every receiver's figures with both their errors.
     pub figures: &'a [ReceiverFigures],
@@ -304,7 +304,7 @@ impl SimulationReport<'_> {
         }
     }
 
-    /// Makes the section on rays of this run that all intersectors were asked.
+    /// Makes the section on rays of this run that all intersectors traced.
     fn cross_check(&self, check: &CrossCheck) -> Section {
         let text = "A sample of the very ray segments of this run, asked again of the octree, of obvhs' BVH over the same facets and of \
             the certified spline intersector. A ray that left a surface starts a few times the tolerance above it, so that all three are \

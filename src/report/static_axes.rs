@@ -22,7 +22,7 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// Makes the scale of an axis from `from` to `to` in the drawing, around these values and, where `zero` is asked, from zero. Values
+    /// Makes the scale of an axis from `from` to `to` in the drawing, around these values and, where `zero` is set, from zero. Values
     /// that have no place on it are left out; without any it goes from 0 to 1, or 1 to 10.
     pub(super) fn new(
         values: impl Iterator<Item = f64>,

@@ -32,7 +32,7 @@ pub fn traffic_sentence(a: &Assessment) -> &'static str {
     }
 }
 
-/// Writes what is asked of a row, cd; in words, or a dash, where it has no limit.
+/// Writes the requirement of a row, cd; in words, or a dash, where it has no limit.
 fn requirement_text(row: &RowVerdict) -> String {
     let number = |x: f64| figures(x, DIGITS);
     match (row.row.min, row.row.max) {
@@ -140,7 +140,7 @@ pub fn verdict_cells(row: &RowVerdict) -> [Cell; 9] {
     ]
 }
 
-/// Makes a table of the rows of an assessment: what is asked and read, both errors, and the verdict. `name` begins the name of its file.
+/// Makes a table of the rows of an assessment: requirement and reading, both errors, and the verdict. `name` begins the name of its file.
 fn table(a: &Assessment, name: &str) -> Table {
     let columns = [
         ("row", ""),
@@ -199,7 +199,7 @@ mod tests {
         assert_eq!(direction_text([-2.5, 0.57]), "2.5L 0.57U");
     }
 
-    /// UN R149 asks 0.8 of the brightest for HV: what is read is what HV has more than that.
+    /// UN R149 requires 0.8 of the brightest at HV: the reading is the excess of HV over that.
     #[test]
     fn a_relative_row_says_what_was_taken_from_its_reading() {
         let regulation = Regulation::find("UN R112 B driving").unwrap();

@@ -224,7 +224,7 @@ impl View {
 }
 
 /// Parts that are shown under names of their own; of more, those that look the same are one surface, for a thousand entries of a
-/// legend says nothing and took 20 s.
+/// legend say nothing and took 20 s.
 const NAMED: usize = 40;
 
 /// One surface of a view.

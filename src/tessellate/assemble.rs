@@ -250,7 +250,7 @@ fn edge_sides<'f, 's>(part: &Part, known: &[(&'f Face, &'f FaceSurface<'s>)]) ->
 }
 
 /// Returns the edges, perhaps twice, that need shorter chords: those that faces ask for, and all edges of at most [`FEW_CHORDS`] samples of
-/// a face that has no mesh or only one of its border. `round` counts from 0; from [`MAX_ROUNDS`] on only faces whose borders cross may ask.
+/// a face that has no mesh or only one of its border. `round` counts from 0; from [`MAX_ROUNDS`] on only faces whose borders cross may.
 fn coarse_edges(
     faces: &[(&Face, Option<FaceSurface<'_>>)],
     meshes: &[Option<FaceMesh>],

@@ -1,4 +1,4 @@
-//! A face's surface laid out for quick evaluation, with what meshing asks of it: tolerance, normals, creases, poles.
+//! A face's surface laid out for quick evaluation, with what meshing needs of it: tolerance, normals, creases, poles.
 
 use super::proof_steps::ProofSteps;
 use super::second_derivatives::SecondDerivativeBounds;

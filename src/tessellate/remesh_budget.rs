@@ -33,7 +33,7 @@ impl RemeshBudget {
 
     /// Returns the edges that stay as they are divided: those of faces that are not to be meshed anew.
     pub(super) fn edges_of_spent<'f>(&self, faces: impl Iterator<Item = &'f Face>) -> FxHashSet<usize> {
-        // Also where the face on the other side asks: with the edge both would be meshed again.
+        // Also where the face on the other side requests it: with the edge both would be meshed again.
         let spent = faces.enumerate().filter(|(k, _)| self.is_spent(*k));
         spent
             .flat_map(|(_, face)| &face.loops)

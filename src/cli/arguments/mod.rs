@@ -1,4 +1,4 @@
-//! What is asked on the command line.
+//! The arguments of the command line.
 
 pub(super) mod command;
 mod help_text;

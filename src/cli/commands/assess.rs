@@ -36,7 +36,7 @@ pub(crate) fn list(console: &Console) -> Result<Completion, Failure> {
 }
 
 /// Judges a far field by a regulation and prints the verdict, or with `--json` its document. It is complete whatever the verdict; it fails
-/// on unknown regulations, results that cannot be read, and far fields that the tables cannot be asked of.
+/// on unknown regulations, results that cannot be read, and far fields that the tables do not apply to.
 pub(crate) fn run(command: &AssessCommand, console: &Console) -> Result<Completion, Failure> {
     let given = command.result.ok_or_else(|| {
         let failure = Failure::arguments("assess: no results are given");
@@ -66,7 +66,7 @@ pub(crate) fn run(command: &AssessCommand, console: &Console) -> Result<Completi
     if console.json {
         print(&json_text(&document)?)?;
     } else {
-        // Data: whether stdout is a terminal is not asked.
+        // Data: whether stdout is a terminal does not matter.
         print(&summary(&assessment, console.width(), str::to_owned))?;
     }
     Ok(Completion::Complete)
@@ -101,7 +101,7 @@ impl ResultsFile {
             let help = "a verdict needs a receiver of kind \"far_field\" with angles \"A\" in a run that counts lm";
             Failure::arguments(format!("{}: {what}", self.path.display())).with_help(help)
         };
-        // The second one shows whether there is a choice to make.
+        // The second one decides whether there is a choice to make.
         match (found.next(), found.next()) {
             (Some(one), None) => Ok(one),
             (None, _) => {

@@ -46,11 +46,11 @@ pub(crate) struct BvhBenchmark {
 /// What the benchmark was asked for.
 pub(crate) struct BvhCommand<'a> {
     pub(crate) file: Option<&'a Path>,
-    /// Rays to ask in place of its own.
+    /// Rays to trace in place of its own.
     pub(crate) rays_in: Option<&'a Path>,
     /// The library of Embree to compare with; `None` leaves Embree out.
     pub(crate) embree: Option<&'a Path>,
-    /// The folder of results, in whose `rays/` the rays are written that were asked.
+    /// The folder of results, in whose `rays/` the traced rays are written.
     pub(crate) folder: &'a Path,
     pub(crate) meshing: &'a MeshingSettings,
     pub(crate) tracing: &'a TracingSettings,
@@ -213,11 +213,11 @@ impl BvhBenchmark {
     }
 
     /// Measures all intersectors on rays of one kind and appends a row for each of three calls: batches and single rays on one thread,
-    /// batches on `threads`. Returns the work of the octree, which must be the first of `contenders`, for the rays asked once, before any
+    /// batches on `threads`. Returns the work of the octree, which must be the first of `contenders`, for the rays traced once, before any
     /// is timed.
     fn measure_rays(&mut self, question: &Question, contenders: &[Contender], threads: usize) -> Cost {
         let Question { mesh, kind, rays, .. } = *question;
-        // The octree's answers are what others are compared with; who is right is asked of the arbiter.
+        // The octree's answers are what others are compared with; the arbiter decides who is right.
         let truth = ask_rays(contenders[0].intersector, rays).0;
         let hits = truth.iter().flatten().count();
         let mut judged: Vec<(Comparison, Cost)> = (contenders.iter())
@@ -342,12 +342,12 @@ struct Comparison {
     wrong: usize,
     /// Of those, the ones where the octree is.
     octree_wrong: usize,
-    /// Of those, the ones that even that could not decide.
+    /// Of those, the ones that the arbiter could not decide.
     undecided: usize,
 }
 
 impl Comparison {
-    /// Counts where hits of one structure differ from the octree's, and asks the arbiter which of the two is wrong.
+    /// Counts where hits of one structure differ from the octree's, and has the arbiter decide which of the two is wrong.
     fn new(mesh: &FacetMesh, rays: &[Ray], octree: &[Option<Hit>], hits: &[Option<Hit>]) -> Self {
         let same = |a: &Option<Hit>, b: &Option<Hit>| match (a, b) {
             (None, None) => true,
@@ -368,7 +368,7 @@ impl Comparison {
     }
 }
 
-/// Returns the answer of the benchmark in words: rates of the octree, asked in batches, and of CwBvh as shipped, by the faster call,
+/// Returns the answer of the benchmark in words: rates of the octree, queried in batches, and of CwBvh as shipped, by the faster call,
 /// on the finest mesh and one thread, and their ratio.
 fn answer_text(rows: &[Value]) -> String {
     let most = rows.iter().filter_map(|r| r["facets"].as_u64()).max().unwrap_or(0);

@@ -36,7 +36,7 @@ use crate::text::{count_of, figures, grouped};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// Rays when nothing else is asked: a second or two on a lamp.
+/// Rays by default: a second or two on a lamp.
 const RAYS: u64 = 100_000;
 /// Fewest rays of a scene's run that the sample is taken from.
 const FEWEST_SCENE_RAYS: u64 = 64;
@@ -71,7 +71,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     let AccurateSettings { meshing, tracing, plan: reached } =
         settings_for_accuracy(command.precision.accuracy, requested, scene, model, &monitor)?;
     let settings = mesh_settings(&meshing, scene, model)?;
-    // Parts that are placed often are meshed, built and asked once, in their own coordinates.
+    // Parts that are placed often are meshed, built and queried once, in their own coordinates.
     let facets = tessellate_by_part(model, &settings, &monitor);
     angle_note(&facets, model, &settings).into_iter().for_each(|note| console.say(note));
     let normals = IntersectorChoice::new(&tracing, scene)?.normals;
@@ -176,7 +176,7 @@ fn refuse_unused_options(tracing: &TracingOptions) -> Result<(), Failure> {
     Err(failure.with_help("leave it out"))
 }
 
-/// Refuses a choice of what finds the hits: all of them are asked.
+/// Refuses a choice of the intersector: all of them are checked.
 fn refuse_intersector(tracing: &TracingOptions) -> Result<(), Failure> {
     if tracing.intersector.is_none() {
         return Ok(());

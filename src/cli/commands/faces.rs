@@ -18,8 +18,8 @@ const SHOWN_PLACES: usize = 12;
 /// Coordinates below this are rounding of what the file has as 0, mm.
 const ROUNDING_MM: f64 = 1e-9;
 
-/// Prints the parts, solids and faces of a model as a tree; with `--json` the document that holds the same, with what the
-/// report lists refusals and problems.
+/// Prints the parts, solids and faces of a model as a tree; with `--json` the document that holds the same, with the report's
+/// refusals and problems.
 pub(crate) fn print_faces(model: &Model, report: &ImportReport, console: &Console) -> Result<(), Failure> {
     let parts = model.account();
     let mut selectors = part_selectors(model).into_iter();
@@ -59,7 +59,7 @@ pub(crate) fn print_faces(model: &Model, report: &ImportReport, console: &Consol
 fn part_selectors(model: &Model) -> Vec<Option<String>> {
     let mut first: Vec<Option<usize>> = vec![None; model.parts.len()];
     for (k, instance) in model.instances.iter().enumerate() {
-        // Where the part stands first: one face of a part is selected by the same keys everywhere.
+        // Where the part stands first: one face of a part has the same keys everywhere.
         first[instance.part.0 as usize].get_or_insert(k);
     }
     let mut faces: Vec<PlacedFace<'_>> = model.placed_faces().collect();

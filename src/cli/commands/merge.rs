@@ -215,7 +215,7 @@ impl Patience {
     }
 }
 
-/// Returns the header of the first part that is there, waited for where that was asked; fails when none came in time.
+/// Returns the header of the first part that is there, waited for if requested; fails when none came in time.
 fn first_header(command: &MergeCommand, patience: &Patience, console: &Console) -> Result<TallyHeader, Failure> {
     loop {
         // Listed anew each time: parts appear in the folder.
@@ -229,7 +229,7 @@ fn first_header(command: &MergeCommand, patience: &Patience, console: &Console) 
     }
 }
 
-/// Returns the failure of a merge whose arguments mean no part, which mentions an interrupted run in one of them.
+/// Returns the failure of a merge whose arguments mean no part, which points out an interrupted run in one of them.
 fn no_part(arguments: &[PathBuf]) -> Failure {
     let Some(folder) = arguments.iter().find(|folder| folder.join(CHECKPOINT).is_file()) else {
         let missing = arguments.first().map_or_else(String::new, |p| p.display().to_string());

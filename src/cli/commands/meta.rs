@@ -40,7 +40,7 @@ pub(crate) fn man(folder: Option<&Path>, console: &Console) -> Result<Completion
     };
     make_folder(folder)?;
     let subcommands: Vec<clap::Command> =
-        // `help` is clap's own and has no page.
+        // `help` is clap's own and has no arguments of ours.
         command.get_subcommands().filter(|c| c.get_name() != "help").cloned().collect();
     let mut pages = vec![("lampyris".to_owned(), command)];
     for subcommand in subcommands {

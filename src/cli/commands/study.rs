@@ -40,7 +40,7 @@ pub(crate) struct StudyCommand<'a> {
     pub(crate) kind: StudyKind,
     pub(crate) file: Option<&'a Path>,
     pub(crate) output: Option<&'a PathBuf>,
-    /// Rays to ask in place of those of the study; `None` for its own.
+    /// Rays to trace in place of those of the study; `None` for its own.
     pub(crate) rays_in: Option<&'a Path>,
     /// The library of Embree to compare with; `None` leaves Embree out.
     pub(crate) embree: Option<&'a Path>,
@@ -119,7 +119,7 @@ fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
         ("--face", !m.face.is_empty(), traces_scene, "it makes facets of its own"),
         ("--role", !m.role.is_empty(), traces_scene, "it makes facets of its own"),
     ];
-    // The first one is reported; the others would be in vain too.
+    // Only the first is reported; the others would fail too.
     let idle = given.iter().find(|(_, given, used, _)| *given && !used);
     let Some((option, _, _, why)) = idle else { return Ok(()) };
     let failure = Failure::arguments(format!("study {} does not take {option}: {why}", kind.name()));
@@ -218,7 +218,7 @@ fn read_model(file: Option<&Path>, console: &Console) -> Result<(Option<Scene>, 
     })
 }
 
-/// Where progress is reported.
+/// Takes reports of progress.
 type Report<'a> = &'a (dyn Fn(Progress) + Sync);
 
 /// Measures cost and accuracy over tolerances, normals and intersectors; for a scene, also what facets change of each receiver.

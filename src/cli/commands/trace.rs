@@ -90,7 +90,7 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     let requested = (command.meshing.clone(), tracing);
     let AccurateSettings { meshing, tracing, plan } =
         settings_for_accuracy(accuracy, requested, Some(&scene), &loaded.model, &monitor)?;
-    // A part that is told how to trace need not read what the others chose.
+    // A part with settings of how to trace need not read what the others chose.
     let chooses_as_part = is_part && !is_accuracy_asked(&meshing, &tracing, &scene);
     let job = SceneJob {
         meshing,
@@ -148,7 +148,7 @@ fn check_options(command: &TraceCommand) -> Result<(), Failure> {
     extra.ends.as_deref().map_or(Ok(()), end_file::check_name)
 }
 
-/// Returns what is asked of the rays, with `--resume` those of the run that is saved; `shard` is its part, as index from 0 and count.
+/// Returns the settings of the rays, with `--resume` those of the saved run; `shard` is its part, as index from 0 and count.
 ///
 /// # Errors
 /// When other rays are asked for than the saved run has.

@@ -206,7 +206,7 @@ fn photometry(receiver: &ReceiverResult, grid: &Grid, lumens: f64) -> Option<Pho
         lamp_lumens: None,
         watts: 0.0,
         opening_mm: [0.0; 3],
-        // These four LM-63-2002 asks of every file.
+        // LM-63-2002 requires these four in every file.
         keywords: [
             ("TEST", receiver.name.as_str()),
             ("TESTLAB", concat!("lampyris ", env!("CARGO_PKG_VERSION"), ", a simulation")),

@@ -262,7 +262,7 @@ impl<'a> Checkpoint<'a> {
 }
 
 /// Returns the settings of a run that goes on from `file`: those that are `asked` for, with the saved number of rays or range where none is
-/// asked; unchanged where no run is saved there.
+/// given; unchanged where no run is saved there.
 ///
 /// # Errors
 /// When other rays are asked for than those of the saved run.

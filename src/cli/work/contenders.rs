@@ -19,7 +19,7 @@ use std::borrow::Cow;
 const TIMED_RAYS: usize = 20_000;
 /// Time of a round, s, that is enough for the slowest: where that takes longer for [`TIMED_RAYS`], fewer are timed.
 const ROUND_SECONDS: f64 = 0.1;
-/// Rays that show how many these are.
+/// Rays by which their number is estimated.
 const PROBED_RAYS: usize = 500;
 /// Timed rounds of every intersector, alternating.
 const TIMED_ROUNDS: usize = 3;
@@ -50,7 +50,7 @@ pub(crate) struct Contenders<'s> {
 }
 
 impl<'a> Structures<'a> {
-    /// Builds those that are compared, of a part that is placed often once; the spline's patches are cut for as many rays as are asked.
+    /// Builds those that are compared, of a part that is placed often once; the spline's patches are cut for as many rays as are traced.
     /// Shows a spinner.
     pub(crate) fn build(
         model: &'a Model,

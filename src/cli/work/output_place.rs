@@ -47,7 +47,7 @@ impl OutputPlace {
     }
 
     /// Takes the lock file of a place in a folder, which is made when missing, or says who has it. Where the file system has no locks, it
-    /// takes it unasked.
+    /// takes it without one.
     fn claim(place: &Path, folder: &Path, lock: PathBuf) -> Result<Self, Failure> {
         make_folder(folder)?;
         let unwritable = |e: std::io::Error| unwritable(folder, &e);
@@ -226,7 +226,7 @@ pub(crate) fn folder_of(path: &Path) -> PathBuf {
     parent.unwrap_or(Path::new(".")).to_path_buf()
 }
 
-/// Refuses a place with less free space than needed; one that does not report it is taken.
+/// Refuses a place with less free space than needed; one with unknown space is taken.
 ///
 /// # Errors
 /// When the file system says that it has less.

@@ -1,4 +1,4 @@
-//! Files of rays that a command is given to trace: records as `check --rays-out` writes them, lists and measured ray sets.
+//! Files of rays for a command to trace: records as `check --rays-out` writes them, lists and measured ray sets.
 
 use crate::cli::failure::Failure;
 use crate::formats::{lower_extension, open_file, read_ray_facets, read_ray_paths};
@@ -36,7 +36,7 @@ pub(crate) struct LeavingRays {
     facets: Vec<f64>,
 }
 
-/// Reads the rays of a file as [`read_rays`] does, and which facets they leave, where it states them.
+/// Reads the rays of a file as [`read_rays`] does, and which facets they leave, where it says so.
 pub(crate) fn read_leaving_rays(path: &Path) -> Result<LeavingRays, Failure> {
     let rays = read_rays(path)?;
     let facets = read_ray_facets(path, rays.len()).map_err(|e| Failure::input(e.to_string()))?;

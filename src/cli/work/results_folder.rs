@@ -118,7 +118,7 @@ pub(crate) struct RunRemarks {
 
 impl RunRemarks {
     /// Puts what came of an error that was asked for into a sentence, which leads the closing lines; says it here where there are none,
-    /// quiet or not where it is why the exit code is not 0. Nothing where nothing was asked.
+    /// quiet or not where it is why the exit code is not 0. Nothing where none was.
     pub(crate) fn say_target(target: Option<TargetResult>, commands: RunCommands, console: &Console) -> Self {
         let sentences: Vec<String> = target.iter().map(target_sentence).collect();
         let is_missed = target.as_ref().is_some_and(|target| !target.reached);

@@ -30,8 +30,8 @@ impl RunCommands {
         Self { traced_by, ..self }
     }
 
-    /// Returns those of a run that this command goes on with, and that is owed to the `earlier` ones so far. The one that began it states
-    /// all, but for a sum of parts.
+    /// Returns the commands of a run that this command continues and that the `earlier` ones traced so far. The one that began it says
+    /// all, except for a sum of parts.
     pub(crate) fn continue_from(self, earlier: &Self) -> Self {
         let mut commands = earlier.clone();
         if !commands.traced_by.is_empty() {
@@ -93,7 +93,7 @@ mod tests {
             assert_eq!(own().search_on_from(&other), own());
         }
         assert_eq!(own().search_on_from(&commands("merge", None, &["a", "b"])), own());
-        // A search that goes on with the run of another command did not begin it, and what it comes to then is not reported by that one.
+        // A search that goes on with the run of another command did not begin it, and that command does not explain its result.
         let resumed = own().continue_from(&commands("plain", None, &[]));
         assert_eq!(commands("again", Some("1%"), &[]).search_on_from(&resumed), commands("again", Some("1%"), &[]));
     }

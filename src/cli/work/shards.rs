@@ -159,7 +159,7 @@ pub(crate) fn say_shard(
     Ok(())
 }
 
-/// Whether a path names a tally file, recognised by its extension.
+/// Whether a path names a tally file, by its extension.
 pub(crate) fn is_tally(path: &Path) -> bool {
     lower_extension(path) == "tally"
 }

@@ -48,7 +48,7 @@ pub(crate) struct TallyHeader {
     /// The options that ask for what was chosen, where the command line did not.
     #[serde(default)]
     pub(crate) accuracy: String,
-    /// What was chosen and why, where nobody asked, with all that the pilot found; a choice of another form costs a pilot and not the file.
+    /// What was chosen and why, where it was open, with all that the pilot found; a choice of another form costs a pilot and not the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     choice: Option<Vec<u64>>,
     seed: Option<u64>,
@@ -157,7 +157,7 @@ impl TallyHeader {
     /// Returns in words what a part of another run differs in from the `first` one: the seed, the rays, options of the facets and of the
     /// tracing; where these are alike, the place of the scene, of which there may be copies; `None` where that is the same, too.
     pub(crate) fn difference(&self, first: &Self) -> Option<String> {
-        // The length of a run that grows distinguishes it from no other.
+        // The length of a run that grows does not identify it.
         let grow = [self, first].iter().all(|h| h.run_rays.is_multiple_of(GROWING_REPLICATE));
         let words = |h: &Self| {
             let seed = h.seed.map_or_else(|| "the seed of its scene".to_owned(), |seed| format!("seed {seed}"));
@@ -195,7 +195,7 @@ impl TallyHeader {
         PathBuf::from(&self.scene)
     }
 
-    /// Returns what the part chose where nobody asked; `None` if somebody did, or it is of a form that is no longer known.
+    /// Returns what the part chose where that was open; `None` if it was not, or the choice is of a form that is no longer known.
     pub(crate) fn choice(&self) -> Option<PartChoice> {
         let chosen = TracingChoice::from_words(self.choice.as_ref()?)?;
         Some(PartChoice { chosen, fingerprint: Fingerprint(self.fingerprint.clone()) })

@@ -13,7 +13,7 @@ use crate::text::{figures, grouped};
 use indicatif::ProgressBar;
 use std::sync::{Mutex, MutexGuard};
 
-/// Shows the stages of a job on the terminal; stops tracing when a signal asks a run to stop that can be saved, and when its paths can
+/// Shows the stages of a job on the terminal; stops tracing when a signal stops a run that can be saved, and when its paths can
 /// no longer be written.
 pub(crate) struct TerminalMonitor<'a> {
     console: &'a Console,
@@ -115,7 +115,7 @@ impl Monitor for TerminalMonitor<'_> {
             (_, NormalMode::Exact) => format!("on facets of {tolerance} with hits moved to the spline"),
             _ => format!("on facets of {tolerance} with {} normals", chosen.normals),
         };
-        // The reason is printed with the results.
+        // The results say why.
         self.console.say(format_args!("tracing {how}"));
     }
 

@@ -89,7 +89,7 @@ impl Usage {
     }
 }
 
-/// Returns the seconds that all threads of this process took so far; `None` where the system does not report it.
+/// Returns the seconds that all threads of this process took so far; `None` where the system does not report them.
 #[cfg(unix)]
 fn cpu_seconds() -> Option<f64> {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
@@ -129,7 +129,7 @@ mod tests {
         assert_eq!(resumed.total(), Some(total));
         let moved = part("a", 3.0, 2.0).continue_from(&part("b", 1.0, 4.0)).total();
         assert_eq!(moved.map(|m| (m.parts, m.machines)), Some((1, 2)));
-        // A part of an earlier version does not state its threads.
+        // A part of an earlier version does not record its threads.
         let old: Usage =
             serde_json::from_str(r#"{"a":{"parts":1,"cpu_seconds":1.0,"slowest_seconds":1.0}}"#).unwrap();
         assert_eq!(old.total().map(|m| (m.parts, m.threads)), Some((1, None)));

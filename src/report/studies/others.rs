@@ -224,7 +224,7 @@ pub(super) fn bvh(rows: &[&Value]) -> (String, Vec<Section>) {
 }
 
 /// Makes a table of every rate beside the octree's on the same model, rays, facets, call and threads; no ratio where the octree was not
-/// asked.
+/// timed.
 fn rate_table(rows: &[&Value]) -> Table {
     let columns = [
         ("rays", ""),

@@ -34,7 +34,7 @@ pub(super) fn report(rows: &[&Value]) -> (String, Vec<Section>) {
 }
 
 /// Makes a table with one row per case, its variants added up: the numbers of right / flagged / wrong answers of every intersector. Not
-/// every one is asked at extreme sizes.
+/// every one is tested at extreme sizes.
 fn case_table(rows: &[&Value]) -> Table {
     let names = distinct(rows, "intersector");
     let columns: Vec<(&str, &str)> =
@@ -48,7 +48,7 @@ fn case_table(rows: &[&Value]) -> Table {
             let own = rows.iter().filter(|r| text(r, "case") == case && text(r, "intersector") == name);
             own.filter_map(|r| r[key].as_u64()).sum()
         };
-        // All variants are asked as many.
+        // All variants have the same number of queries.
         let rays = rows.iter().find(|r| text(r, "case") == case).and_then(|r| r["rays"].as_u64()).unwrap_or(0);
         let verdict = |n: &&str| {
             let [right, flagged, wrong] = ["right", "flagged", "wrong"].map(|key| sum(n, key));

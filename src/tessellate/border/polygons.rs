@@ -117,13 +117,13 @@ impl BorderPolygons {
     }
 }
 
-/// Corners of a polygon from which on it is no longer asked whether its chords leave anything of its loop.
+/// Corners of a polygon from which on the check that its chords leave anything of its loop is skipped.
 const MANY_CORNERS: usize = 8;
 /// Share of a loop's area that the polygon of its chords keeps.
 const KEPT_AREA: f64 = 0.1;
 
 /// Returns the edges of loops whose chords enclose less than [`KEPT_AREA`] of the loop's area in parameters, or turn inside out: an arc and
-/// a flat hyperbola over one chord, say. Polygons of more than [`MANY_CORNERS`] corners are not asked.
+/// a flat hyperbola over one chord, say. Polygons of more than [`MANY_CORNERS`] corners are not checked.
 pub(in crate::tessellate) fn edges_of_collapsed_loops(
     loops: &[TrimLoop],
     polygons: &BorderPolygons,

@@ -154,7 +154,7 @@ impl CandidateFacet {
             let [a, b, c] = corners.map(|k| p[k]);
             let across = (b - a).cross(c - a);
             let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-            // Which way it is turned is not asked here.
+            // Which way it is turned is not checked here.
             let off = |n: Vector| across.angle_between(n).min((-across).angle_between(n));
             across.length() > LEAST_WIDTH * longest * longest
                 && corners.iter().filter_map(|&k| normals[k]).any(|n| off(n) > most)

@@ -61,7 +61,7 @@ pub(super) struct CellFacets<'b, 'g, 's, 'a> {
 }
 
 impl CellFacets<'_, '_, '_, '_> {
-    /// Bounds the triangle of nodes `t`, held to `slack` times its tolerance; whether it holds is for the caller to ask.
+    /// Bounds the triangle of nodes `t`, held to `slack` times its tolerance; the caller checks whether it holds.
     fn prove(&mut self, t: [u32; 3], slack: f64) -> ProvedFacet<3> {
         prove_triangle(self.prover, self.input.nodes, t, self.input.chords, slack)
     }

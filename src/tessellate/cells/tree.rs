@@ -183,7 +183,7 @@ impl Tree<'_, '_> {
         }
         let candidate = CandidateFacet::new(self.surface, cell);
         let cut = self.crease_to_cut(cell).or_else(|| self.turn_to_cut(cell));
-        // No curvature need be asked where the samples are farther off than the loosest tolerance: so are those of most cells above leaves.
+        // No curvature is needed where the samples are farther off than the loosest tolerance: so are those of most cells above leaves.
         let loosest = self.surface.field.loosest() * branch.slack;
         let is_too_large = candidate.largest_sag() > loosest;
         // A crease is cut along before anything is proved: no facet may lie across it.

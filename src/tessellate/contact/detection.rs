@@ -81,7 +81,7 @@ pub(super) fn contacts<'m>(
     };
     let mut out = with_one_role_each(pairs.par_iter().filter_map(carried).collect());
     out.sort_unstable();
-    // Tighter than asked, so that the guest's own proof, over other parameters, has a share left.
+    // Tighter than requested, so that the guest's own proof, over other parameters, has a share left.
     for c in &out {
         // Guests prove the carrier's facets over parameters of their own.
         if let Some(field) = trimmed.get(&c.guest).map(|guest| guest.surface.field)

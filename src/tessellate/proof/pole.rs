@@ -7,7 +7,7 @@
 //! of 160 000. A triangle from pole to pole and to a corner `x` stands for what lies between its own line from pole to pole and the
 //! parameter line through `x`.
 //!
-//! Why the bound of `prover.rs` holds: all it asks of a piece is that it is the image of a disc of parameters whose boundary falls into
+//! Why the bound of `prover.rs` holds: all it requires of a piece is that it is the image of a disc of parameters whose boundary falls into
 //! curves between the corners, and here the disc is the quadrilateral of corners and feet. It is convex, as its two sides along the pole
 //! (or the poles) are parallel, so the two parameter triangles that it is cut into cover it, and P to T is their larger bound. For T to P
 //! each boundary curve is shrunk onto its own edge: the lines into the pole onto the sides there, the base or what the trim puts in its

@@ -165,7 +165,7 @@ impl<'s, 'a> Prover<'s, 'a> {
     /// Returns a bound of the distance from the surface over a parameter triangle to a triangle in space and from its sides to theirs, by
     /// one quick look; `None` when that does not show it to be within the limit. Above the limit it is what no bound can be below: a sample
     /// of the surface, or the gap of a corner. `exact`: the corners are known to lie on the surface. It is always `None` on an affine
-    /// surface and with [`Acceptance::Sampled`], where [`Self::triangle_bound`] is to be asked.
+    /// surface and with [`Acceptance::Sampled`], where [`Self::triangle_bound`] is to be used.
     pub(in crate::tessellate) fn facet_bound(
         &mut self,
         uv: [Uv; 3],

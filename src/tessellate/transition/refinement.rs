@@ -82,7 +82,7 @@ impl DelaunayMesh<'_, '_> {
     /// Inserts a point for each failing triangle that can gain: on its worst side inside the outline, or at its centre. Returns whether any
     /// was inserted.
     pub(super) fn refine(&mut self, failing: &[ProvedFacet<3>], chords: &BorderChords) -> bool {
-        // Sides are shared by two triangles, which both may ask: one point a side and round is enough.
+        // Sides are shared by two triangles, which both may request one: one point a side and round is enough.
         let mut divided: FxHashSet<[u32; 2]> = FxHashSet::default();
         let wishes: Vec<Wish> = failing
             .iter()

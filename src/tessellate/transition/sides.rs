@@ -107,7 +107,7 @@ mod tests {
     const CORNERS: u32 = 40;
 
     /// A ring of a tube's parameters with an island in its hole, in loops of [`CORNERS`]; each point that is inserted, on either side,
-    /// costs questions about the triangles around it alone, and the answers are those of asking all anew.
+    /// costs tests of the triangles around it alone, and the results are those of testing all anew.
     #[test]
     fn new_triangles_alone_are_asked() {
         let tube = sweep::cylinder(&Frame::IDENTITY, 10.0, [0.0, 3.0], [0.0, 40.0]);
