@@ -92,7 +92,7 @@ fn deep_nesting_and_huge_counts_end_quickly() {
     assert!(start.elapsed() < Duration::from_secs(10));
 }
 
-/// Elements of a set are told from those before them by a table: a search through 200,000 took seven seconds of an optimised build.
+/// Repeated elements of a set are found by a table: a search through 200,000 took seven seconds of an optimised build.
 #[test]
 fn a_set_of_many_surfaces_takes_one_look_each() {
     const SURFACES: u32 = 200_000;

@@ -1,4 +1,4 @@
-//! The hash by which builds without a commit are told apart: another source gives another one, and nothing else does.
+//! The hash that identifies builds without a commit: another source gives another one, and nothing else does.
 
 use crate::build_script::hash_of_files;
 use std::fs;

@@ -1,4 +1,4 @@
-//! `check` with the real binary: rays that were answered differently can be written out and asked again.
+//! `check` with the real binary: rays that were answered differently can be written out and traced again.
 
 use crate::files::fixture;
 use crate::support::lampyris;
@@ -111,7 +111,7 @@ fn parts_that_are_placed_often_are_built_once() {
     assert_eq!([count(many, "/facets_vs_exact/unexplained"), count(many, "/octree_vs_bvh/disagree")], [0, 0]);
 }
 
-/// Rays within a lens that is thinner than what keeps them clear of coarse facets are asked within it.
+/// Rays within a lens that is thinner than what keeps them clear of coarse facets are traced within it.
 #[test]
 fn rays_within_a_thin_wall_start_within_it() {
     let folder = tempfile::tempdir().unwrap();

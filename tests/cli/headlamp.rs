@@ -134,7 +134,7 @@ fn until_settled_traces_on_or_says_what_it_cannot() {
     assert_eq!(found["rays"], 30_000);
 }
 
-/// The field of visibility goes on to 45°, the far field to 30°: no rays tell what is beyond, and none are traced for it.
+/// The field of visibility goes on to 45°, the far field to 30°: no rays show what is beyond, and none are traced for it.
 #[test]
 fn what_no_rays_settle_is_not_waited_for() {
     let folder = tempfile::tempdir().unwrap();
@@ -154,7 +154,7 @@ fn what_no_rays_settle_is_not_waited_for() {
     assert!(found["rays"].as_u64().unwrap() < 4_000_000, "{} {err}", found["rays"]);
 }
 
-/// A number of rays that changes nothing is refused, and one that changes some of the sources alone is told.
+/// A number of rays that changes nothing is refused, and one that changes some of the sources alone is reported.
 #[test]
 fn rays_that_sources_do_not_heed_are_not_asked_for_in_silence() {
     let run = |folder: &tempfile::TempDir| {

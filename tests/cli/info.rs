@@ -214,7 +214,7 @@ fn faces_are_listed_with_the_places_of_their_own_part() {
     );
 }
 
-/// Why faces are missing from the list is told beside it, with -q too, and in the document as `info` has it without the list.
+/// Why faces are missing from the list is stated beside it, with -q too, and in the document as `info` has it without the list.
 #[test]
 fn faces_that_were_refused_are_told_beside_the_list() {
     let folder = tempfile::tempdir().unwrap();
@@ -242,7 +242,7 @@ fn faces_that_were_refused_are_told_beside_the_list() {
     }
 }
 
-/// Cut between two records, where nothing else tells of it: what is missing is not known, so that the whole is not there either.
+/// Cut between two records, where nothing else shows it: what is missing is not known, so that the whole is not there either.
 #[test]
 fn a_file_that_was_cut_off_is_told_and_incomplete() {
     let folder = tempfile::tempdir().unwrap();

@@ -332,7 +332,7 @@ fn faces_that_have_no_facets_make_a_trace_incomplete() {
     assert!(code == 0 && !err.contains("no facets"), "{code} {err}");
 }
 
-/// Whoever puts a lamp into an opaque part or misspells a glass is told what it is and what to do, on the terminal and in the report.
+/// A lamp in an opaque part and a misspelled glass are explained, with what to do, on the terminal and in the report.
 #[test]
 fn a_source_in_an_opaque_part_and_an_unknown_medium_are_told() {
     let opaque = |scene: String| scene.replace("medium = \"glass\"", "surface = \"mirror\"\nreflectance = 0.9");

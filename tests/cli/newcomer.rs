@@ -40,7 +40,7 @@ fn a_scene_is_made_for_a_file_and_can_be_traced_at_once() {
     assert_eq!(lampyris_in(path, &["trace", "a/b/s.toml", "--dry-run"]).0, 0);
 }
 
-/// A damaged file gets a scene of what is left of it, and whoever asks for it learns what is missing.
+/// A damaged file gets a scene of what is left of it, and the user learns what is missing.
 #[test]
 fn a_scene_for_a_damaged_file_tells_what_is_missing() {
     let folder = tempfile::tempdir().unwrap();
@@ -176,7 +176,7 @@ fn folders_of_outputs_are_made() {
     assert!(["one/two/a.stl", "three/all.rays", "four/odd.rays"].iter().all(|file| path.join(file).is_file()));
 }
 
-/// What a run finds out about itself is told once on the terminal, of merged parts too, not in the report alone.
+/// The notes of a run are printed once on the terminal, those of merged parts too, not in the report alone.
 #[test]
 fn what_a_run_finds_is_told_on_the_terminal() {
     let folder = tempfile::tempdir().unwrap();

@@ -6,7 +6,7 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// Whoever goes on from a sum of some parts is told what traced these, in the order of their numbers, and what traced the rest.
+/// A run continued from a sum of parts reports what traced these, in the order of their numbers, and what traced the rest.
 #[test]
 fn a_run_that_goes_on_from_a_sum_names_all_that_traced_it() {
     let folder = lens(|m| m);

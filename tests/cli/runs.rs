@@ -102,7 +102,7 @@ fn rays_lost_in_merged_ranges_can_be_traced_again() {
         assert!(code == 4 && err.contains("of the energy of this part was lost"), "{code} {err}");
     }
     let (code, _, err) = lampyris_in(folder.path(), &["merge", "parts", "-o", "out", "--no-report"]);
-    // The whole run tells that light was lost.
+    // The whole run reports that light was lost.
     assert_eq!(code, 4, "{err}");
     let ledger = std::fs::read_to_string(folder.path().join("out/lost_rays.csv")).unwrap();
     let rows: Vec<Vec<&str>> = ledger.lines().skip(1).map(|l| l.split(',').collect()).collect();
@@ -150,7 +150,7 @@ fn shards_merge_to_the_bits_of_one_run() {
         document(path, &["merge", "part3.tally", "part1.tally", "part2.tally", "-o", "merged", "--json"], 0);
     assert_eq!(whole["digest"], merged["digest"]);
     assert_eq!(whole["power"], merged["power"]);
-    // The merge alone tells nobody how to get the numbers again.
+    // The merge alone does not show how to reproduce the numbers.
     let traced_by = &merged["provenance"]["traced_by"];
     let shards: Vec<&str> = traced_by.as_array().unwrap().iter().map(|command| command.as_str().unwrap()).collect();
     let is_of_shard =
@@ -382,7 +382,7 @@ fn merged_parts_end_as_the_single_run_does() {
     assert!(code == 3 && err.contains("--scene"), "{code} {err}");
     let elsewhere = ["merge", "parts", "-o", "out", "--scene", "moved/scene.toml"];
     assert_eq!(lampyris_in(path, &[&elsewhere[..], &["--max-refused", "1", "--max-lost", "1"]].concat()).0, 0);
-    // A part too few is waited for as long as was asked.
+    // A missing part is waited for as long as requested.
     std::fs::rename(path.join("parts/shard-2-of-2.tally"), path.join("late")).unwrap();
     let start = std::time::Instant::now();
     let (code, _, err) = lampyris_in(path, &[&elsewhere[..], &["--wait", "1"]].concat());
@@ -427,7 +427,7 @@ fn parts_refuse_what_they_do_not_do() {
     assert!(code == 0 && err.contains("traced already"), "{code} {err}");
 }
 
-/// A run that ends before its error is as small as was asked says so on the terminal.
+/// A run that ends before it reaches its error target says so on the terminal.
 #[test]
 fn an_error_that_is_not_reached_is_said() {
     let folder = lens(|m| m);

@@ -56,7 +56,7 @@ fn a_run_says_what_the_scene_lacks() {
     assert!(trace("[[source]]\nkind = 'point'\n").contains("the scene has no receiver"));
 }
 
-/// An error that was asked for and reached is told once, in the answer.
+/// An error target that was reached is reported once, in the answer.
 #[test]
 fn a_reached_error_is_part_of_the_answer() {
     let folder = tempfile::tempdir().unwrap();

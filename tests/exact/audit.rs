@@ -180,7 +180,7 @@ fn hard_surfaces() {
             total.undecided += tally.undecided;
         }
         println!("{kind}: {total:?}");
-        // Near a collapsed end a tenth of the rays is aimed where only rounding tells.
+        // Near a collapsed end a tenth of the rays is aimed where only rounding decides.
         assert!(total.hits > total.rays / 4, "{kind}: {total:?}");
         assert!(total.flagged * 20 <= total.rays && total.undecided * 8 <= total.rays, "{kind}: {total:?}");
     }
@@ -205,7 +205,7 @@ fn fuzz_surfaces() {
         .reduce(|| [0; 3], |a, b| [0, 1, 2].map(|k| a[k] + b[k]));
     println!("{surfaces} surfaces, {rays} rays: {flagged} flagged, {undecided} undecided by clipping, none wrong");
     assert!(flagged <= rays / 5000 + 1, "{flagged} of {rays} flagged");
-    // Undecided rays prove nothing: clipping ran out of steps, or found crossings too close to tell apart. Of the first 10,000
+    // Undecided rays prove nothing: clipping ran out of steps, or found crossings too close to separate. Of the first 10,000
     // there were none.
     assert!(undecided <= rays / 1000, "{undecided} of {rays} undecided by clipping");
 }

@@ -78,7 +78,7 @@ fn what_a_budget_leaves_open_is_flagged() {
             let right = k < 2 && is_right(hit.t, k);
             assert!(right || hit.certainty != Certainty::Certified, "{crossings:?} for {truths:?} by {ray:?}");
         }
-        // What is missing behind the last one is reported by no crossing.
+        // What is missing behind the last one shows in no crossing.
         for truth in truths.iter().filter(|truth| crossings.iter().all(|hit| (hit.t - **truth).abs() >= 1e-6)) {
             assert!(
                 undecided_from < truth + 1e-6,
@@ -227,7 +227,7 @@ fn tangencies_are_told_to_the_last_bit() {
 
 #[test]
 fn a_contact_of_fourth_order_is_told_as_tangent() {
-    // z = x⁴/2¹⁸: at x = 0 the sheet does not bend, so that no box shows whether it is met there; 64·(2u − 1)⁴ has Bézier points of ±64.
+    // z = x⁴/2¹⁸: at x = 0 the sheet does not bend, so that no box decides whether it is met there; 64·(2u − 1)⁴ has Bézier points of ±64.
     let knots = [vec![0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0], vec![0.0, 0.0, 1.0, 1.0]];
     let places = [(-64.0, 64.0), (-32.0, -64.0), (0.0, 64.0), (32.0, -64.0), (64.0, 64.0)];
     let points = places.iter().flat_map(|&(x, z)| [-32.0, 32.0].map(|y| Point::new(x, y, z).extend(1.0))).collect();
@@ -235,7 +235,7 @@ fn a_contact_of_fourth_order_is_told_as_tangent() {
     let mut s = Random(87);
     let mut tangent = 0;
     for _ in 0..100 {
-        // Below the sheet: nothing is met, and what is told to be met within rounding is no certified hit.
+        // Below the sheet: nothing is met, and what is reported as met within rounding is no certified hit.
         let height = 10f64.powf(s.within(-18.0, -14.0));
         let ray = Ray::new(Point::new(-96.0, s.within(-16.0, 16.0), -height), Vector::X);
         let answer = exact.first(&ray, &mut Cost::default());

@@ -81,7 +81,7 @@ fn light_stays_in_a_room_whose_edges_gape() {
     }
 }
 
-/// A ray that is asked again behind what it met is not given that again, and one whose range has ended meets nothing.
+/// A ray that is traced on behind what it met does not meet that again, and one whose range has ended meets nothing.
 #[test]
 fn what_was_met_in_a_gap_is_not_met_again() {
     let gap = 1e-4;

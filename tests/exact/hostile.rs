@@ -223,7 +223,7 @@ fn no_certified_answer_on_a_hostile_face_is_wrong() {
     assert!(out.flagged * 100 < out.certified, "{} flagged, {} certified", out.flagged, out.certified);
 }
 
-/// A ray along the line where a face folds meets it where the two roots beside each other cannot be settled: each is told once.
+/// A ray along the line where a face folds meets it where the two roots beside each other cannot be settled: each is reported once.
 #[test]
 fn a_root_that_stays_open_is_one_crossing() {
     const FACE: usize = 143;

@@ -73,7 +73,7 @@ fn leave(bowl: &Bowl, rays: usize, seed: u64) -> Count {
         let chord = 2.0 * rise / bend;
         let end = [x + chord * d.x, y + chord * d.y];
         let meets = chord > 0.0 && end.iter().all(|x| x.abs() < 0.499);
-        // Shorter chords are the own point to the ninth digit and some; beside the rim nothing is asked.
+        // Shorter chords are the own point to the ninth digit and some; beside the rim nothing is checked.
         if chord.abs() < 2e-6 || chord > 0.0 && !meets && end.iter().all(|x| x.abs() < 0.501) {
             continue;
         }
@@ -205,7 +205,7 @@ fn chords_of_a_coarse_fillet_are_found() {
 }
 
 /// Chords of a cone beside its knot lines, near the tip, where a quarter of a turn is less than a micrometre to some millimetres wide: its
-/// own start is no hit, whichever side of the line it is told to lie on.
+/// own start is no hit, whichever side of the line it is said to lie on.
 #[test]
 fn chords_near_the_tip_of_a_cone_are_found() {
     let (slope, height) = (30.0 / 80.0, 80.0);

@@ -218,7 +218,7 @@ fn bits(hits: &[Option<Hit>]) -> Vec<Option<(u32, [u64; 6])>> {
 }
 
 /// Rays of a point and of a disc, others from all around, and what goes on from where they hit: a batch answers them as if each were
-/// asked alone, and whether or not it was told of the sources.
+/// traced alone, and whether or not it was prepared for the sources.
 #[test]
 fn a_batch_gives_the_bits_of_rays_asked_alone() {
     for (name, surface) in [("sphere", sphere(50.0)), ("torus", torus(50.0, 15.0)), ("freeform", reflector(6))] {

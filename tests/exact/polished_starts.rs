@@ -24,7 +24,7 @@ fn a_ray_that_escapes_the_spline_meets_nothing() {
         ("torus", model([torus(50.0, 15.0)]), 0.1, 1000),
         ("reflector", model([reflector(6)]), 0.3, 1000),
         ("bowl", model([cap(0.0, 50.0)]), 0.15, 1000),
-        // The spline is asked about all hits but those on the flattest facets.
+        // The spline is queried for all hits but those on the flattest facets.
         ("two sheets", model([cap(0.0, 50.0), cap(0.15, 50.0)]), 0.0, 50),
     ];
     for (name, model, least_share, least_free) in models {
@@ -73,7 +73,7 @@ fn a_ray_that_escapes_the_spline_meets_nothing() {
     }
 }
 
-/// Facets that count how often they are asked.
+/// Facets that count their queries.
 struct CountedAsks<'a>(&'a Octree<'a>, AtomicUsize);
 
 impl Intersector for CountedAsks<'_> {
@@ -92,7 +92,7 @@ impl Intersector for CountedAsks<'_> {
     }
 }
 
-/// Light of a chip starts a hundredth of a millimetre over it: the flat chip behind is not asked about. Of a ball the facet behind a start
+/// Light of a chip starts a hundredth of a millimetre over it: the flat chip behind gets no query. Of a ball the facet behind a start
 /// hides the piece of it that lies ahead.
 #[test]
 fn only_curved_facets_are_looked_for_behind_a_start() {
@@ -128,7 +128,7 @@ fn only_curved_facets_are_looked_for_behind_a_start() {
     assert!(hidden > 100, "{hidden}");
 }
 
-/// A model with its facets, polished; what is asked of it is counted by `ask`.
+/// A model with its facets, polished; its queries are counted by `ask`.
 fn with_polished<T>(model: &Model, tolerance: f64, ask: impl FnOnce(&Polished<'_>) -> T) -> T {
     let mesh = mesh(model, tolerance);
     let exact = Exact::build(model, &Settings::default());
@@ -201,7 +201,7 @@ fn light_that_meets_a_wall_before_a_dome_meets_the_wall() {
     });
 }
 
-/// Chords inside a rod, whose facets are as long as itself and a millimetre wide: to which side a ray leaves is told across the strip.
+/// Chords inside a rod, whose facets are as long as itself and a millimetre wide: to which side a ray leaves is decided across the strip.
 #[test]
 fn chords_of_a_rod_of_long_facets_are_found() {
     let rod = sweep::cylinder(&Frame::IDENTITY, 3.0, [0.0, TAU], [0.0, 400.0]);

@@ -52,7 +52,7 @@ impl Sub for Wide {
 impl Mul for Wide {
     type Output = Self;
     fn mul(self, b: Self) -> Self {
-        // Veltkamp's split: no fused operation is asked of the processor.
+        // Veltkamp's split: no fused operation is needed.
         let halves = |x: f64| {
             let c = 134_217_729.0 * x;
             let high = c - (c - x);

@@ -64,7 +64,7 @@ fn places_of_few_rays_have_honest_errors() {
             }
         }
     }
-    // One to five rays a run, as 2.4 are expected; nothing is told of the runs without.
+    // One to five rays a run, as 2.4 are expected; nothing is known of the runs without.
     assert!((1200..=1600).contains(&told), "{told}");
     assert!(missed.len() as f64 <= 0.02 * f64::from(told), "{} of {told}: {missed:?}", missed.len());
 }

@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// Half the size of the heap, mm.
 const SIZE: f64 = 10.0;
-/// What f32 leaves of a distance, in its own size: starts, directions and corners are rounded, and hits at a glance are told worse.
+/// What f32 leaves of a distance, in its own size: starts, directions and corners are rounded, and grazing hits are less accurate.
 const SINGLE: f64 = 1e-4;
 
 /// Rays that hit otherwise than the octree's, which are `rays` long.

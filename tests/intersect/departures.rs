@@ -1,4 +1,4 @@
-//! Rays that leave a facet, asked of every intersector: they meet what lies ahead, and not what they leave.
+//! Rays that leave a facet, on every intersector: they meet what lies ahead, and not what they leave.
 
 use crate::facets::{all, ask, at_a_seam};
 use crate::support::*;

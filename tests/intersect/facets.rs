@@ -1,4 +1,4 @@
-//! The contract of intersectors on facets, asked of every one of them.
+//! The contract of intersectors on facets, tested on every one of them.
 
 use crate::departures::leave;
 use crate::support::*;

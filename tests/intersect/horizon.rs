@@ -1,4 +1,4 @@
-//! A ray that the octree calls gone meets nothing, asked of every kind of mesh by a structure that knows no horizons.
+//! A ray that the octree reports as escaped meets nothing, checked on every kind of mesh by a structure without horizons.
 
 use crate::support::*;
 use lampyris::intersect::bvh::{self, Bvh};

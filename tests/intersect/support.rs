@@ -197,7 +197,7 @@ pub(crate) fn lamp(n: usize) -> (FacetMesh, Vec<Point>) {
 }
 
 /// Distance to the nearest triangle by Möller and Trumbore's formula, over all of them, with a margin: the facets whose
-/// weights come within `1e-9` of zero make the answer uncertain, recognised by the second value.
+/// weights come within `1e-9` of zero make the answer uncertain, as the second value says.
 pub(crate) fn by_hand(mesh: &FacetMesh, ray: &Ray) -> (Option<f64>, bool) {
     let mut nearest: Option<f64> = None;
     let mut doubtful = false;

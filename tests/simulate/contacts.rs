@@ -32,7 +32,7 @@ fn a_source_finds_the_bodies_around_it() {
 }
 
 /// A box of glass without its lid does not lie around a source above it, though light comes in by the opening and leaves by the floor; nor
-/// around one beside it. Of a source in its box each ray is asked, and the answer says so.
+/// around one beside it. Each ray of a source in its box is probed, and the answer says so.
 #[test]
 fn a_source_beside_an_open_body_is_not_in_it() {
     let mut world = World::default();
@@ -58,7 +58,7 @@ fn a_source_beside_an_open_body_is_not_in_it() {
     }
 }
 
-/// Of a source exactly on a surface, or one that reaches from outside into a body, each ray is asked.
+/// Each ray of a source exactly on a surface, or of one that reaches from outside into a body, is probed.
 #[test]
 fn a_source_on_a_surface_or_across_one_loses_nothing() {
     for source in [

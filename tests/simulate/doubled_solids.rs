@@ -1,4 +1,4 @@
-//! A body that stands twice in one place is told, as a copy that a file should not hold.
+//! A body that stands twice in one place is reported, as a copy that a file should not hold.
 
 use crate::support::World;
 use lampyris::math::{Frame, Point, Vector};

@@ -336,7 +336,7 @@ fn bare_faces_without_a_medium_are_none_for_light() {
     }
 }
 
-/// A filter leaves 2.6 quanta of each ray, which are counted as 3: no spread tells of it, and the error is half a quantum of each. That is
+/// A filter leaves 2.6 quanta of each ray, which are counted as 3: no spread shows it, and the error is half a quantum of each. That is
 /// 1/6 of what arrives, however many rays are traced.
 #[test]
 fn what_rounding_changes_behind_a_dense_filter_is_in_the_error() {

@@ -139,7 +139,7 @@ fn a_run_says_what_its_facets_do_to_a_spot() {
 }
 
 /// The two maps of a run on facets and on the spline differ in the brightest cell, in all cells together and in power by what the
-/// two whole runs differ by, within the errors that are told.
+/// two whole runs differ by, within the errors that are reported.
 #[test]
 fn errors_of_maps_are_what_whole_runs_differ_by() {
     let case = case("s3_reflector.toml", "", 1 << 15);

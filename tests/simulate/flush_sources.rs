@@ -1,5 +1,5 @@
 //! Sources flush with the face of a body: they start in what the scene says that they are inside of, in the face and within the glue
-//! distance to either side of it; where it is silent they start inside, and that is reported.
+//! distance to either side of it; where it says nothing they start inside, and a note says so.
 
 use crate::support::{Shape, World};
 use lampyris::formats::{LightRay, write_rays};
@@ -263,7 +263,7 @@ fn a_flush_source_of_which_nothing_is_said_is_told() {
     }
 }
 
-/// Nothing is told of light that goes away from the face, of a face that shines itself, where the scene says what the source is in, and
+/// No note is given for light that goes away from the face, of a face that shines itself, where the scene says what the source is in, and
 /// where the face does nothing to light or lets none in.
 #[test]
 fn flush_sources_that_are_meant_so_are_not_told() {
@@ -309,7 +309,7 @@ fn a_source_between_plates_is_told_where_they_differ() {
     }
 }
 
-/// Whether so few rays start in a face that they need not be told is judged by the rays of their source, however many others send.
+/// Whether too few rays start in a face for a note is judged by the rays of their source, however many others send.
 #[test]
 fn flush_sources_are_told_by_their_own_rays() {
     let text = format!(
@@ -321,7 +321,7 @@ fn flush_sources_are_told_by_their_own_rays() {
     assert!(is_told(&results), "{:?}", results.notes);
 }
 
-/// What a source of fewer rays than replicates lies in is found wherever its rays are: of 128 replicates every other one was asked.
+/// What a source of fewer rays than replicates lies in is found wherever its rays are: of 128 replicates every other one was probed.
 #[test]
 fn sources_of_few_rays_know_what_they_lie_in() {
     for rays in [1, 2, 32, 100] {

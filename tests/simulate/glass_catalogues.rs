@@ -126,7 +126,7 @@ fn light_beyond_the_transmittances_of_a_glass_is_noted() {
     assert_eq!((notes(650.0, ""), notes(850.0, "absorption_per_mm = 0.001")), (String::new(), String::new()));
 }
 
-/// Eight tables that light goes beyond are named, and of more the number is reported.
+/// Eight tables that light goes beyond are named; beyond them only the number is given.
 #[test]
 fn many_ranges_that_light_goes_beyond_are_counted() {
     for (count, rest) in [(8, None), (9, Some("beyond 1 more range of")), (10, Some("beyond 2 more ranges of"))] {

@@ -122,7 +122,7 @@ fn a_ray_of_a_run_that_grows_can_be_traced_again() {
     assert_eq!(replay(&bound, &world, &settings, &[30_000]).rays, 0);
 }
 
-/// Round numbers of many rays are divided so without being asked to.
+/// Round numbers of many rays are divided so by default.
 #[test]
 fn large_round_runs_can_grow() {
     let (world, bound) = ball();
@@ -136,7 +136,7 @@ fn large_round_runs_can_grow() {
     assert!(!run(20_000).grows);
 }
 
-/// Notes what is asked in batches, and passes it on.
+/// Records the queries in batches, and passes them on.
 struct Noted<'w> {
     world: &'w World,
     rays: Mutex<Vec<[u64; 6]>>,
@@ -161,7 +161,7 @@ impl Intersector for Noted<'_> {
     }
 }
 
-/// Traced once more together, rays of all sources ask what each asks by itself; the run has not the last of them.
+/// Traced once more together, rays of all sources make the queries that each makes by itself; the run lacks the last of them.
 #[test]
 fn rays_that_are_asked_again_ask_the_same() {
     let (world, bound) = ball();
@@ -183,7 +183,7 @@ fn rays_that_are_asked_again_ask_the_same() {
     }
 }
 
-/// Keeps what it is told to expect: all rays, and those of each beam.
+/// Keeps what it is given to expect: all rays, and those of each beam.
 struct Told<'a>(&'a World, Mutex<Vec<u64>>);
 
 impl Intersector for Told<'_> {

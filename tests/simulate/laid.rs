@@ -32,7 +32,7 @@ fn light_of_a_disc_on_an_opaque_solid_goes_out() {
 }
 
 /// A source in a face of an opaque solid that shines into it alone stands inside, as one a millimetre further in does: none of its light
-/// comes out on the outer side, and all of it is told as lost there. Turned round it shines out; with a medium of index 1 it lights the
+/// comes out on the outer side, and all of it is reported as lost there. Turned round it shines out; with a medium of index 1 it lights the
 /// room.
 #[test]
 fn light_of_a_source_in_the_wall_of_a_solid_room_is_told_as_inside() {

@@ -1,4 +1,4 @@
-//! What became of each ray of a list: ends, faces and powers that can be recognised by hand.
+//! What became of each ray of a list: ends, faces and powers that can be computed by hand.
 
 use crate::support::World;
 use lampyris::formats::{Flux, LightRay, Tm25, write_rays, write_tm25};
@@ -52,7 +52,7 @@ fn every_ray_of_a_list_tells_where_it_ended() {
         direction: Vector::Z,
         power,
     };
-    // Light that leaves is told of 100 mm on its way.
+    // Light that leaves is reported 100 mm on its way.
     let expected = [
         ListedEnd { point: Point::new(0.0, 0.0, 30.0), ..end(0, Event::Received, None, 2.0) },
         end(1, Event::Absorbed, Some(BLACK), 4.0),
@@ -82,7 +82,7 @@ fn every_ray_of_a_list_tells_where_it_ended() {
     assert!((mirror.power - 2.0).abs() < 0.6, "{}", mirror.power);
 }
 
-/// A ray that cannot start, because it is in more bodies than it can carry, is told of where it stands in the scene.
+/// A ray that cannot start, because it is in more bodies than it can carry, is reported where it stands in the scene.
 #[test]
 fn a_ray_that_cannot_start_is_placed_in_the_scene() {
     let mut world = World::default();

@@ -1,4 +1,4 @@
-//! The main job from the library: what it is told to stop is gone on with, and it does not matter who listens.
+//! The main job from the library: a stopped run can be continued, and monitors change no result.
 
 use lampyris::model::Model;
 use lampyris::pipeline::{
@@ -124,7 +124,7 @@ fn requests_that_cannot_be_met_say_what_to_do() {
     assert!(text("quadtree".parse::<IntersectorKind>().unwrap_err()).contains("octree, bvh2, cwbvh, exact"));
 }
 
-/// One ray of the bright source in a test point would break its limit: that none arrived among a thousand does not tell.
+/// One ray of the bright source in a test point would break its limit: that none arrived among a thousand decides nothing.
 #[test]
 fn a_dark_test_point_is_judged_by_what_one_ray_adds() {
     let text = "[run]\nunit = 'lm'\n\

@@ -1,4 +1,4 @@
-//! Faces that a file gives as ready meshes beside faces with a surface: the spline is asked where there is one, the mesh where there is
+//! Faces that a file gives as ready meshes beside faces with a surface: the spline is queried where there is one, the mesh where there is
 //! none, and only what has no true surface is without an error.
 
 use crate::support::{Shape, World};

@@ -431,7 +431,7 @@ fn light_beyond_a_table_is_named() {
     }
 }
 
-/// The schema's conditions speak of keys that there are, and ask for those without which the reader refuses an entry.
+/// The schema's conditions name keys that exist, and require those without which the reader refuses an entry.
 #[test]
 #[cfg(feature = "schema")]
 fn the_schema_asks_for_what_the_reader_asks_for() {

@@ -1,4 +1,4 @@
-//! Where the kernel makes do with less than a scene asks for: it is counted and told.
+//! Where the kernel makes do with less than a scene asks for: it is counted and reported.
 
 use crate::support::{Shape, World};
 use lampyris::math::{Frame, Point};
@@ -51,7 +51,7 @@ fn a_touching_face_that_bounds_no_body_there_is_counted() {
     assert!(results.notes.iter().any(|note| note.contains("crossed the first alone")), "{:?}", results.notes);
 }
 
-/// A source in glass below a stack of 1050 sheets: the way out through these is given up, and two ways beside them tell that it is in
+/// A source in glass below a stack of 1050 sheets: the way out through these is given up, and two ways beside them show that it is in
 /// the glass, where e⁻⁵ of its light passes the 5 mm before the first sheet.
 #[test]
 fn a_way_out_that_was_given_up_decides_nothing() {

@@ -43,7 +43,7 @@ fn rules(model: &Model, materials: &str) -> Result<Vec<RuleFaces>, Error> {
     bound(model, materials).map(|bound| bound.rules().to_vec())
 }
 
-/// A text that is no colour would else ask for nothing, and so mean every face.
+/// A text that is no colour would else select by nothing, and so mean every face.
 #[test]
 fn what_is_no_colour_is_refused_in_rules_sources_and_receivers() {
     let model = twins();
@@ -120,7 +120,7 @@ fn two_solids_of_one_part_are_told_apart() {
     }
 }
 
-/// A part that stands twice under one name, in two assemblies: the path decides which, the name means both.
+/// A part that stands twice under one name, in two assemblies: the path identifies one, the name means both.
 #[test]
 fn places_of_one_name_are_told_apart_by_their_paths() {
     let mut world = World::default();
@@ -261,7 +261,7 @@ fn assert_each_selects_its_own(model: &Model, step: usize) -> usize {
 #[test]
 fn every_face_has_a_selector_of_its_own() {
     assert_eq!(assert_each_selects_its_own(&twins(), 1), 2);
-    // Copies of one part under one name: nothing but their place distinguishes them.
+    // Copies of one part under one name: only their place distinguishes them.
     let mut model = twins();
     for k in 1..4 {
         let mut copy = model.instances[0].clone();

@@ -134,8 +134,7 @@ fn parts_of_a_run_have_the_sequences_of_the_whole() {
     assert_eq!(results(whole), results(sum));
 }
 
-/// Scattering inside a body is a step as a hit of a face is: in the order of the path, and reported for light that is counted right after
-/// it.
+/// Scattering inside a body is a step as a hit of a face is: in the order of the path, and noted for light that is counted right after it.
 #[test]
 fn scattering_in_a_body_is_a_step_in_its_place() {
     let mut world = World::default();

@@ -412,8 +412,8 @@ fn a_source_that_straddles_a_boundary_is_seen_with_two_replicates() {
     }
 }
 
-/// Of 120 beams 30 start within a plate of 3 mm that absorbs 1/mm, 30 before it, 30 on a black die, and 30 pass beside both: boxes tell
-/// which of so many start clear of all solids, and only of those no ray is asked. What a pass absorbs is 1 − e^(−3), and 4 % turn back at
+/// Of 120 beams 30 start within a plate of 3 mm that absorbs 1/mm, 30 before it, 30 on a black die, and 30 pass beside both: boxes show
+/// which of so many start clear of all solids, and only those get no probe rays. What a pass absorbs is 1 − e^(−3), and 4 % turn back at
 /// each face.
 #[test]
 fn of_many_sources_those_in_and_on_solids_are_seen() {
@@ -454,7 +454,7 @@ fn a_source_that_sends_next_to_no_rays_is_named() {
     assert_eq!(notes("rays = 10_000"), "");
 }
 
-/// The power of a source that is weak beside another is right where whole quanta can tell it, and else this is told.
+/// The power of a source that is weak beside another is right where whole quanta resolve it, and else a note says so.
 #[test]
 fn a_source_that_is_weak_beside_another_keeps_its_power_or_is_named() {
     let mut world = World::default();

@@ -119,7 +119,7 @@ fn light_crosses_a_wedge_next_to_its_edge() {
         let (model, cover) = (wedge_on_base(gap, covered), 1.55);
         for (x, sign) in [2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.2].into_iter().flat_map(|x| [(x, 1.0), (x, -1.0)]) {
             let way = way(x, sign, gap, [indices[0], indices[1], cover]);
-            // Light that goes through the gap beside the wedge, or out of the end of the cover over the edge, is not asked where it
+            // Light that goes through the gap beside the wedge, or out of the end of the cover over the edge, is not checked where it
             // goes. The beam is 2.3 µm long where it meets the base.
             let beside = sign < 0.0 && (covered || x < gap / GRAZING.tan() + 1.5e-3);
             let [inside, out] = way.ends;

@@ -103,7 +103,7 @@ const TRIALS: usize = 800;
 const CONFIDENCE: f64 = 0.0016;
 
 /// Lamps a little too bright for their limit, by few rays, by rays of two weights, by few replicates: seldom one passes. 3.6 rays are none
-/// with 2.7 %, and ten light rays say nothing of heavy ones that are seldom met.
+/// with 2.7 %, and ten light rays say nothing about heavy ones that seldom arrive.
 #[test]
 fn few_rays_pass_no_lamp_that_is_too_bright() {
     let (regulation, mut random) = (one_point(), Random(20_261_123));

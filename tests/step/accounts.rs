@@ -79,7 +79,7 @@ fn a_colour_is_found_beside_a_reference_that_leads_nowhere() {
     let face = &part.shells[0].faces[0];
     assert_eq!(face.colour.map(|c| c.0), Some([0.25, 0.5, 0.75]));
     assert_eq!(crate::support::violations(part, face), Vec::<String>::new());
-    // The reference is told, and nothing else.
+    // The reference is reported, and nothing else.
     let problems = &import.report.problems;
     assert!(problems.len() == 1 && problems[0].contains("#999"), "{problems:?}");
 }

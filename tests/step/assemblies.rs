@@ -30,7 +30,7 @@ pub(crate) fn assembly(items: &str, data: &str) -> Import {
 /// The place of the part in the assembly by usage #400, at x = 10.
 const PLACED: &str = "#420=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#410,#401);\n";
 
-/// Asserts the x of all places, in any order, and that nothing is told.
+/// Asserts the x of all places, in any order, and that nothing is reported.
 pub(crate) fn assert_places(import: &Import, expected: &[f64], case: &str) {
     let mut x: Vec<f64> = import.model.instances.iter().map(|i| i.placement.origin.x).collect();
     x.sort_by(f64::total_cmp);
@@ -158,7 +158,7 @@ fn each_mapped_item_of_a_usage_is_an_occurrence() {
         names.sort_unstable();
         assert_eq!(names, ["part:1", "part:2"]);
     }
-    // One that cannot be read is told, and the other stands.
+    // One that cannot be read is reported, and the other stands.
     let broken = placed_by("#36,#34");
     assert_eq!(broken.model.instances.iter().map(|i| i.placement.origin.x).collect::<Vec<_>>(), [20.0]);
     let problems = &broken.report.problems;
@@ -302,7 +302,7 @@ fn deep_assemblies_are_no_cycles() {
     for levels in [70, 1000] {
         assert_places(&nested(levels), &[10.0 * f64::from(levels)], &format!("{levels} levels"));
     }
-    // Beyond the limit what is left out is told, and stands nowhere else.
+    // Beyond the limit what is left out is reported, and stands nowhere else.
     let import = nested(1100);
     assert_eq!(import.model.instances.len(), 0);
     let told = import.report.problems.iter().filter(|p| p.contains("nested more than 1024 deep")).count();
@@ -317,7 +317,7 @@ fn products_in_a_circle_are_told() {
     assert!(problems.iter().any(|p| p.ends_with("products contain each other")), "{problems:?}");
 }
 
-/// A part stands once, and the mapped item that would show it in itself is told, as its own or by way of another representation.
+/// A part stands once, and the mapped item that would show it in itself is reported, as its own or by way of another representation.
 #[test]
 fn representations_in_a_circle_are_told() {
     let part = product(100, "part", 110)

@@ -258,7 +258,7 @@ fn a_line_that_passes_a_vertex_by_gives_way_to_both() {
         assert_eq!(import.report.faces.refused, 0, "{:?}", import.report.refusals);
         assert_eq!(import.report.faces.repaired, 1, "{:?}", import.report.repairs);
     }
-    // By as little as files state that points may be apart, nothing is told.
+    // By as little as files state that points may be apart, nothing is reported.
     let line = "#80=LINE('',#81,#82);\n#81=CARTESIAN_POINT('',(0.,0.,0.));\n#82=VECTOR('',#83,1.);\n#83=DIRECTION('',(1.,-0.005,0.));\n";
     let import = import(&square_along(line));
     close(area(&import), 1.0, 1e-12);

@@ -140,7 +140,7 @@ fn a_gap_beyond_the_edge_is_neither_refused_nor_told() {
             let import = half_disc(unit, FINE, 0.0, Some(beyond));
             assert_read(&import, None, 12.5 * PI, &format!("{} {beyond}", unit.name));
         }
-        // A gap that it does run over is told all the same.
+        // A gap that it does run over is still reported.
         let both = half_disc(unit, FINE, 0.02, Some(1.0));
         assert_read(&both, Some("lie apart"), 12.5 * PI + 0.1, unit.name);
     }

@@ -50,7 +50,7 @@ fn shapes_in_a_circle_stand_all_the_same() {
     assert_places(&read(&(block(110) + &block(120) + &placed)), &[0.0, 20.0], "a circle");
 }
 
-/// What is there for mapped items stands where these do; without any it is told, once.
+/// What is there for mapped items stands where these do; without any it is reported, once.
 #[test]
 fn a_shape_that_no_mapped_item_shows_is_told() {
     let mapped = block(110) + "#30=REPRESENTATION_MAP(#20,#110);\n#31=REPRESENTATION_MAP(#21,#110);\n";
@@ -66,7 +66,7 @@ fn a_shape_that_no_mapped_item_shows_is_told() {
 }
 
 /// A map, as captures of product data have it, whose representation lists the solid of #110 once more, with a curve; one with a solid of
-/// its own besides is told.
+/// its own besides is reported.
 #[test]
 fn a_map_of_what_stands_already_is_not_told() {
     let capture = |items: &str| {

@@ -50,7 +50,7 @@ fn a_linked_mesh_is_left_out_where_what_it_shows_stands() {
     }
 }
 
-/// The mesh of a solid without a face that can be converted is all that there is of it; what is refused is told once.
+/// The mesh of a solid without a face that can be converted is all that there is of it; what is refused is reported once.
 #[test]
 fn a_mesh_of_what_is_refused_stands_in_its_place() {
     for (exact, faces) in [("#27,", 1), ("#24,#27,", 7)] {

@@ -103,7 +103,7 @@ fn a_body_between_the_legs_of_another_is_a_solid() {
     assert!((found - 744.0).abs() < 1e-6, "{found}");
 }
 
-/// A hollow block and a block beside it in one shell; and the same turned inside out, which the solids' volumes tell.
+/// A hollow block and a block beside it in one shell; and the same turned inside out, which the solids' volumes show.
 #[test]
 fn a_turned_piece_within_another_is_its_void() {
     let hollow = || Body::block([3.0; 3], [7.0; 3]).turned();
@@ -124,7 +124,7 @@ fn a_turned_piece_within_another_is_its_void() {
     }
 }
 
-/// Faces with edges of their own, and a body that lacks a face, say nothing of where one body ends.
+/// Faces with edges of their own, and a body that lacks a face, do not show where one body ends.
 #[test]
 fn a_shell_whose_edges_do_not_close_it_stays_one() {
     let blocks = || [Body::block([0.0; 3], [10.0; 3]), Body::block([20.0, 0.0, 0.0], [30.0, 10.0, 10.0])];

@@ -267,7 +267,7 @@ fn a_void_outside_of_its_solid_is_a_solid_of_its_own() {
         assert!((volume - 2.0 * SIDE.powi(3)).abs() < 1e-6, "{turn}: {volume}");
         let said = import.report.repairs.iter().filter(|r| r.reason.contains("a solid of its own")).count();
         assert_eq!((made.shells.closed, said), (2, 1), "{turn}: {:?}", import.report.repairs);
-        // Of an outer shell that lacks the face on that side nobody can tell.
+        // For an outer shell that lacks the face on that side this is undecided.
         let open = text
             .replace("#5=MANIFOLD_SOLID_BREP('',#4);", &shells)
             .replace("#100036=ADVANCED_FACE(", "#100036=FACE_SURFACE_OF_NO_KIND(");
@@ -298,7 +298,7 @@ fn a_surface_of_the_shell_of_a_solid_is_that_solid() {
     );
 }
 
-/// The void of a solid that the list does not name is told; so is a face, and without it the volume says nothing of the side.
+/// The void of a solid that the list does not name is reported; so is a face, and without it the volume does not decide the side.
 #[test]
 fn entries_of_shells_and_solids_that_are_no_references_are_told() {
     let text = solid_text(&cube_corners(), &CUBE, &[".T."; 6], None);

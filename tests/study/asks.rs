@@ -27,7 +27,7 @@ fn read(path: &Path) -> Model {
     step::read(path, &step::Settings::default()).expect("fixtures are readable").model
 }
 
-/// Rays of the job that is asked about.
+/// Rays of the job under test.
 const JOB: f64 = 1e6;
 
 /// Every combination that the sweep knows, with its seconds for the job.
@@ -249,7 +249,7 @@ fn rays_that_facets_alone_send_must_keep_what_is_asked() {
     assert!(apart.facets > 2 * alike.facets, "{}\n{}", alike.answer, apart.answer);
 }
 
-/// However much light meets a plane, what little meets a curved face beside it keeps what is asked.
+/// However much light meets a plane, what little meets a curved face beside it keeps the target.
 #[test]
 fn hits_on_flat_faces_do_not_make_up_for_others() {
     let ball = known_scenes::ball(10.0, 1.5);

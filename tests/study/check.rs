@@ -163,7 +163,7 @@ fn planted_defects_are_found() {
     assert_eq!(found.octree_vs_bvh.disagree, 0, "both have the same hole");
     assert!(unexplained(&found, Defect::MissedCrossing) > 0);
 
-    // What was found can be written out and asked again.
+    // What was found can be written out and traced again.
     let mut bytes = Vec::new();
     let defects = found.disagreements.iter().filter(|d| matches!(d.cause, Some(Cause::Unexplained(_))));
     records::write(&mut bytes, defects.map(|d| (d.ray, d.octree.map(|h| h.t)))).unwrap();

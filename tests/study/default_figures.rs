@@ -101,7 +101,7 @@ fn misses(known: &KnownScene, answer: &Answer) -> Vec<String> {
     let mut missed = Vec::new();
     for &(name, truth) in &known.figures {
         let figure = named(&answer.figures[0], name);
-        // Places are counted in steps: the finest width distinguished from zero is 1.6e-5 of the half side.
+        // Places are counted in steps: the finest width that is distinguished from none is 1.6e-5 of the half side.
         let steps = if matches!(name, "power" | "max") { 1e-9 * truth.abs() } else { 2e-5 * known.half };
         if (figure.value - truth).abs() > 3.0 * figure.combined() + steps {
             missed.push(format!("{}: {name} {} ± {}, truly {truth}", known.name, figure.value, figure.combined()));
@@ -125,7 +125,7 @@ fn the_default_answer_is_right_on_scenes_known_in_closed_form() {
 }
 
 /// A black ball takes a ten-thousandth of the light, three rays of the pilot, none of which need pass its facets: that they see no
-/// difference tells of none.
+/// difference shows none.
 #[test]
 fn a_receiver_that_few_rays_of_the_pilot_reach_takes_the_spline() {
     let text = "[[source]]\nkind = 'cone'\nhalf_angle_deg = 60\nat = [0, 0, -200]\ndirection = [0, 0, 1]\npower = 1\n\
@@ -255,7 +255,7 @@ fn what_a_black_ball_takes_is_judged_without_a_receiver() {
         let off = (sum.value - truth).abs();
         assert!(off > 10.0 * sum.statistical && off < 3.0 * sum.combined(), "{sum:?}, truly {truth}");
     }
-    // Facets that nobody compared say nothing of their error.
+    // Facets that were not compared do not show their error.
     let unmeasured = power_figures(&results, TracedGeometry::Unmeasured, "W");
     assert!(unmeasured.by_body[0].geometric.is_none() && unmeasured.escaped.geometric.is_none());
 }

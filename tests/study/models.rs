@@ -30,7 +30,7 @@ fn cross_checked(model: &Model, rays: u64) -> CrossCheck {
     cross_check(&subjects, &chain, &Settings::default(), &|_| ())
 }
 
-/// The rounds on one model take seconds, and are told one by one.
+/// The rounds on one model take seconds, and are reported one by one.
 #[test]
 fn the_study_of_normals_tells_how_far_it_is_within_a_model() {
     let model = read_model(&fixture("step/lens_planoconvex_nurbs.stp")).unwrap();

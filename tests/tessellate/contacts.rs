@@ -106,7 +106,7 @@ fn a_short_rod_does_not_refine_its_hole() {
     assert!(facets_of(&made, 6).len() < 200, "{}", facets_of(&made, 6).len());
 }
 
-/// A facet is held against what was asked of its own face, whatever is asked of the one that touches it.
+/// A facet is held to the tolerance of its own face, whatever that of the one that touches it.
 #[test]
 fn faces_in_contact_keep_the_tolerances_asked_of_them() {
     for finer in [1, 6] {

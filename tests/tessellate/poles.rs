@@ -93,7 +93,7 @@ fn a_ring_of_sectors_that_no_two_can_be_joined_of_comes_to_an_end() {
 }
 
 /// Caps of spheres of a kilometre and more as splines, four metres from the origin and aslant, so that every control point is rounded,
-/// those of the pole one by one: every vertex normal is that of the sphere, as near as rounded control points tell it.
+/// those of the pole one by one: every vertex normal is that of the sphere, as near as rounded control points allow.
 #[test]
 fn poles_of_large_spheres_have_their_normals() {
     let axis = Vector::new(0.48, -0.6, 0.64);
@@ -107,7 +107,7 @@ fn poles_of_large_spheres_have_their_normals() {
                 let shell = Shell { faces: vec![Face::whole(surface)], ..Shell::default() };
                 let model = Model::from_part(Part { shells: vec![shell], ..Part::default() });
                 let mesh = tessellate(&model, &Settings::default()).mesh;
-                // Control points are rounded by some ulps of the radius; a normal is known from two that lie a part of the aperture apart.
+                // Control points are rounded by some ulps of the radius; a normal is given by two that lie a part of the aperture apart.
                 let rounding = 64.0 * f64::EPSILON * radius / aperture;
                 let worst = mesh.vertices.iter().map(|v| {
                     let place = mesh.positions[v.position as usize];

@@ -1,4 +1,4 @@
-//! Faces that cannot be meshed as asked: something is made of them all the same, named, with the distance that was reached.
+//! Faces that cannot be meshed as requested still get a mesh, and are named with the distance that was reached.
 
 use lampyris::math::{Frame, Point, Uv};
 use lampyris::model::{Edge, EdgeId, EdgeUse, Face, Model, Part, Shell, TrimLoop, VertexId};

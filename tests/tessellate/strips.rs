@@ -77,7 +77,7 @@ fn a_strip_that_is_nowhere_wide_is_proved() {
     }
 }
 
-/// Where the parameters of a strip are one line, but for rounding to one side or the other, they do not even decide which side is outside:
+/// Where the parameters of a strip are one line, but for rounding to one side or the other, they do not even show which side is outside:
 /// its loop does.
 #[test]
 fn a_face_of_its_border_alone_runs_along_its_edges_as_its_loops_do() {

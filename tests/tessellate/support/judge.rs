@@ -116,7 +116,7 @@ pub(crate) struct Found {
 }
 
 /// Looks at all promises of a model that stands at the origin, unscaled, whose trims stray up to `gap` from their edges; the first
-/// that is broken is told.
+/// that is broken is reported.
 pub(crate) fn judge(model: &Model, made: &Tessellation, gap: f64) -> Result<Found, String> {
     let mut found = Found { facets: made.mesh.facets.len(), ..Found::default() };
     if made.report.faces.failed > 0 {
