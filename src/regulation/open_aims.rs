@@ -18,7 +18,7 @@ const AIMS_AT_ONCE: usize = 4;
 
 /// What is remarked on rows that another open aim makes unsure: by a verdict of its own, and by none as it sees them outside.
 const OTHER_BY_AIM: &str =
-    "by an aim that the errors of the map leave open its verdict is another; more rays tell which aim holds";
+    "by an aim that the errors of the map leave open its verdict is another; more rays decide which aim holds";
 const OUTSIDE_BY_AIM: &str = "by an aim that the errors of the map leave open it lies outside the far field";
 
 /// Judges all rows as the map is aimed, and then by the other aims that its errors leave open. A lamp that is aimed by noise fails and

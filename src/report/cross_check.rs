@@ -113,7 +113,7 @@ pub fn verdict(check: &CrossCheck) -> String {
 pub(super) fn run_verdict(check: &CrossCheck, on_spline: bool) -> String {
     if on_spline && check.scene.facets > 0 {
         return format!(
-            "{} ray segments were asked again on facets, which the run did not use: {}.",
+            "{} ray segments were traced again on facets, which the run did not use: {}.",
             grouped(check.rays),
             findings(check)
         );

@@ -306,9 +306,9 @@ impl SimulationReport<'_> {
 
     /// Makes the section on rays of this run that all intersectors traced.
     fn cross_check(&self, check: &CrossCheck) -> Section {
-        let text = "A sample of the very ray segments of this run, asked again of the octree, of obvhs' BVH over the same facets and of \
-            the certified spline intersector. A ray that left a surface starts a few times the tolerance above it, so that all three are \
-            asked the same question.";
+        let text = "A sample of the very ray segments of this run, traced again by the octree, by obvhs' BVH over the same facets and by \
+            the certified spline intersector. A ray that left a surface starts a few times the tolerance above it, so that all three \
+            get the same query.";
         let section = Section::new("Cross-check")
             .with_block(text)
             .with_block(cross_check::count_table(check))
@@ -354,7 +354,7 @@ impl SimulationReport<'_> {
                     figures(self.results.segments as f64 / self.results.rays as f64, 4)
                 ),
             ),
-            ("check", s.check, "some of its rays asked again of BVH and spline".to_owned()),
+            ("check", s.check, "some of its rays traced again by BVH and spline".to_owned()),
         ] {
             table.row([name.into(), Cell::Number(time, 3), what.into()]);
         }

@@ -67,7 +67,7 @@ pub(super) fn cut_sequences_note(sums: &SequenceSums) -> Option<String> {
         limit => format!("source and first {} alone", count_of(limit as u64, "step")),
     };
     Some(format!(
-        "light took so many ways to its receivers that `sequences` tells them apart by {by}, in place of {MOST_STEPS} steps"
+        "light took so many ways to its receivers that `sequences` distinguishes them by {by}, in place of {MOST_STEPS} steps"
     ))
 }
 

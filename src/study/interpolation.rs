@@ -222,7 +222,7 @@ impl Ratios {
                 "the mean falls; at creases and needles, where curvature jumps within a facet, no rule is better",
             ),
             (false, false) => {
-                Some("curvature jumps within many facets (creases, needles), of which the corners do not tell")
+                Some("curvature jumps within many facets (creases, needles), which the corners do not show")
             }
         };
         let (nearest_to_bilinear, bilinear_to_cubic) = (n / b, b / c);

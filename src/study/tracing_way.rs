@@ -65,7 +65,7 @@ pub(super) fn unfit_moved_hits(lost: [f64; 2], asked: f64) -> Option<&'static st
     if lost[0] > lost[1] {
         Some("hits moved to the spline lose more light than it")
     } else if MOVED_HIT + asked * SPLINE_HIT >= SPLINE_HIT {
-        Some("moving hits would ask the spline so often that by counted work it is no cheaper")
+        Some("moving hits would query the spline so often that by counted work it is no cheaper")
     } else {
         None
     }

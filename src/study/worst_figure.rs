@@ -135,7 +135,7 @@ impl Worst {
         let by = self.share.map_or_else(|| "where it is 0".into(), |s| format!("by {} %", two_digits(100.0 * s)));
         let figure = figure_in_words(&self.figure);
         if self.is_certain {
-            return format!("{figure} {by}, where the pilot's rays tell of no standard error");
+            return format!("{figure} {by}, where the pilot's rays give no standard error");
         }
         format!("{figure} {by}, {} times its standard error", two_digits(self.ratio))
     }
@@ -179,10 +179,7 @@ mod tests {
         worst.weigh(["lamp", "absorbed"], 0.0, 0.0, 0.0);
         assert_eq!(worst.in_words(), "not at all");
         worst.weigh(["lamp", "absorbed"], 1e-4, 0.0, 0.0);
-        assert_eq!(
-            worst.in_words(),
-            "lamp: absorbed where it is 0, where the pilot's rays tell of no standard error"
-        );
+        assert_eq!(worst.in_words(), "lamp: absorbed where it is 0, where the pilot's rays give no standard error");
         assert_eq!(worst.ratio, LARGEST_RATIO);
         let mut worst = Worst::default();
         worst.weigh(["lamp", "rms_1"], 0.2, 0.05, 2.0);

@@ -53,7 +53,7 @@ fn the_race_writes_rows_pictures_and_the_octree() {
     }
     // Rates of two kinds of call: the headline says which is whose.
     let page = String::from_utf8(read("report.html")).unwrap();
-    assert!(page.contains("asked in batches") && page.contains("by the faster of its two calls"));
+    assert!(page.contains("queried in batches") && page.contains("by the faster of its two calls"));
     boxes_are_closed_and_hold_the_lens(folder.path());
 }
 

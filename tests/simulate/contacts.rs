@@ -53,7 +53,7 @@ fn a_source_beside_an_open_body_is_not_in_it() {
         };
         let [found, said] = ["", "inside = []"].map(|inside| world.run(&text(inside), |_| ()));
         assert_eq!(found.digest == said.digest, !asked, "{source}");
-        let told = |notes: &[String]| notes.iter().any(|n| n.contains("each ray is asked"));
+        let told = |notes: &[String]| notes.iter().any(|n| n.contains("each ray is probed"));
         assert_eq!((told(&found.notes), told(&said.notes)), (asked, false), "{source}: {:?}", found.notes);
     }
 }

@@ -386,7 +386,7 @@ fn answer_text(rows: &[Value]) -> String {
     let octree = rate("octree", "batch");
     let cwbvh = f64::max(rate("cwbvh as shipped", "single"), rate("cwbvh as shipped", "batch"));
     format!(
-        "With {} facets and {kind} rays on one thread the octree, asked in batches, answers **{} million rays/s**; obvhs' CwBvh as \
+        "With {} facets and {kind} rays on one thread the octree, queried in batches, answers **{} million rays/s**; obvhs' CwBvh as \
          shipped, by the faster of its two calls, answers {} million rays/s: **{} ×** (medians of {ROUNDS} alternating rounds).",
         grouped(most),
         figures(octree, 3),

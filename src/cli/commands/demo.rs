@@ -74,7 +74,7 @@ pub(crate) fn run(
     let what = format!("{} rays, {} segments", grouped(r.rays), grouped(r.segments));
     say_step("trace", what, s.trace);
     if let Some(check) = &run.check {
-        let what = format!("{} ray segments asked again of BVH and exact spline", grouped(check.rays));
+        let what = format!("{} ray segments traced again by BVH and exact spline", grouped(check.rays));
         say_step("check", what, s.check);
     }
     let commands = RunCommands::new(None, console);

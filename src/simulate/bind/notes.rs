@@ -228,7 +228,7 @@ pub(super) fn opening_note(bound: &BoundScene, model: &Model) -> Option<String> 
     };
     let asked = (0..bound.emitters.len()).find(|&k| within(k)).map_or_else(String::new, |k| {
         let source = bound.scene.source_label(k);
-        format!("; {source} is in its box, and each ray is asked what it starts in, many times the work: say what by `inside`")
+        format!("; {source} is in its box, and each ray is probed for what it starts in, many times the work: state it by `inside`")
     });
     Some(format!(
         "'{instance}'{others} has the medium '{medium}' but no closed shell{sheet}: light that passes its opening is lost; close it in \

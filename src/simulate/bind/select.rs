@@ -335,7 +335,7 @@ pub(super) fn advice<'a>(
         _ if model.placed_face_count() == 0 => empty_model_advice(scene).into(),
         "solid" => "its solids have no names: give the number, as in `solid = 0`".into(),
         "layer" => "the model has no layers".into(),
-        "face" => "its faces have no names: `lampyris info FILE --faces` shows what else tells them apart".into(),
+        "face" => "its faces have no names: `lampyris info FILE --faces` shows what else distinguishes them".into(),
         _ => "the model has no such names".into(),
     })
 }
