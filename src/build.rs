@@ -57,7 +57,7 @@ pub(crate) fn hash_of_files(paths: &[impl AsRef<Path>]) -> u64 {
 }
 
 /// Returns the file, or all files in the folder and its folders, in no order. Names that begin with `.` or end with `~` are passed over:
-/// systems and editors leave them, and nobody compiles them.
+/// systems and editors leave them, and they are not compiled.
 fn files_below(path: &Path) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(path) else { return vec![path.to_path_buf()] };
     let is_source = |entry: &DirEntry| {

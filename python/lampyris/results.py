@@ -288,7 +288,7 @@ class Run(Mapping[str, Receiver]):
 
     @property
     def check(self) -> dict[str, Any] | None:
-        """Some of the rays asked again of BVH and spline."""
+        """The cross-check of some of the rays on BVH and spline."""
         return self.document.get("check")
 
     @property

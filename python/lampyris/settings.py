@@ -1,4 +1,4 @@
-"""What is asked of a trace beside the scene, checked before any work."""
+"""The settings of a trace beside the scene, checked before any work."""
 
 from __future__ import annotations
 

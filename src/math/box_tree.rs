@@ -1,8 +1,8 @@
 //! A tree of boxes: which of very many a ray crosses, about the nearest first, which of them another box meets, and which of them meet
 //! each other.
 //!
-//! Guarantee: no box is left out that a box meets, or that a ray crosses by more than rounding: whoever looks for what touches a side
-//! grows the boxes first, see [`Aabb::with_room`]. The tree depends on the boxes and their order alone.
+//! Guarantee: no box is left out that a box meets, or that a ray crosses by more than rounding: to find what touches a side,
+//! grow the boxes first, see [`Aabb::with_room`]. The tree depends on the boxes and their order alone.
 
 use super::{Aabb, Ray, Vector};
 use smallvec::SmallVec;

@@ -1,6 +1,6 @@
 //! Arrays of plain numbers as bytes and back, as fast as memory: what is kept from one run to the next is read this way.
 //!
-//! Numbers are as this machine has them; whoever keeps them says for which kind of machine.
+//! Numbers have this machine's byte order; a caller that stores them records the kind of machine.
 
 use crate::math::huge_pages;
 use bytemuck::{AnyBitPattern, NoUninit};

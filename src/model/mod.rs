@@ -1,9 +1,9 @@
 //! The CAD model: parts of shells of trimmed rational B-spline faces, placed by instances. Always millimetres.
 //!
-//! What every consumer may rely on, whoever built the model:
+//! What every consumer of a model may rely on:
 //!
-//! * each face's surface is clamped, and its domain contains every trimming loop: no period, no seam crossing. Whoever builds a
-//!   face on a closed surface moves the seam away from the face, or cuts the face open along it;
+//! * each face's surface is clamped, and its domain contains every trimming loop: no period, no seam crossing. The builder of
+//!   a face on a closed surface moves the seam away from the face, or cuts the face open along it;
 //! * loops are closed in the parameter plane, the face's material lies on their left (outer loops
 //!   counter-clockwise, holes clockwise in `(u, v)`), and they include pole edges of zero length in space;
 //! * an edge's uv curve has the edge's own parameter: `surface(uv(t)) ≈ curve(t)` within [`Face::gap`];

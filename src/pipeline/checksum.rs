@@ -102,7 +102,7 @@ mod tests {
         }
     }
 
-    /// What is no tree is built anew as what is damaged is, though whoever wrote it gave it the checksum that it has to have.
+    /// Data that is no tree is rebuilt as damaged data is, even with a correct checksum.
     #[test]
     fn an_octree_that_is_no_tree_is_built_anew_with_a_right_checksum_too() {
         let positions = vec![Point::ZERO, Point::X, Point::new(1.0, 1.0, 0.0), Point::Y];

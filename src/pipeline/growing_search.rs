@@ -8,7 +8,7 @@ use crate::simulate::{GROWING_REPLICATE, PartialRun, Results};
 const MOST_SEARCHED_RAYS: u64 = 10_000_000_000;
 /// Standard deviations of an error's own error that [`growth_margin`] leaves room for: of 25 searches one traces once more.
 const MARGIN_SIGMAS: f64 = 2.0;
-/// Largest such margin: of few replicates one more run costs less than rays that nobody needs.
+/// Largest such margin: with few replicates one more run costs less than unneeded rays.
 const MOST_MARGIN: f64 = 2.0;
 /// Least and greatest growth of the rays: fewer would be a run for little, more would trust a poor first error too much.
 const GROWTH_RANGE: [f64; 2] = [2.0, 64.0];

@@ -21,7 +21,7 @@ pub struct Aim {
     /// How far the errors of the map may have moved the aim: where each of its independent causes brings it at three standard errors to
     /// either side, degrees to the right and up. What a row reads there is an error of its reading.
     pub moved: Vec<[[f64; 2]; 2]>,
-    /// The same by the width of the map's cells, within which nobody knows where light falls off.
+    /// The same by the width of the map's cells, within which the position of the fall-off is unknown.
     pub blurred: Vec<[[f64; 2]; 2]>,
 }
 

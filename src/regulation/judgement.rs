@@ -76,7 +76,7 @@ pub(super) struct Decisive {
 const BISECTIONS: usize = 16;
 
 impl Decisive {
-    /// Whether no other error need be there to leave the verdict open: on its very limit a reading stays unsure with any.
+    /// Whether the error of the cells alone leaves the verdict open: a reading exactly on its limit stays unsure with any.
     pub(super) fn cells_leave_open(&self) -> bool {
         self.margin.abs() <= SIGMAS * self.reading.cells
     }
@@ -177,7 +177,7 @@ impl Judgement {
             let sign = if reading.value < comparison.limit { 1.0 } else { -1.0 };
             let mut noise = photometer.map.noise(&comparison.weights, sign, margin, sigmas);
             noise.other += comparison.by_aim[1].powi(2);
-            // What nobody knows of the facets may be more than any margin.
+            // An unknown error of the facets may exceed any margin.
             let geometric = reading.geometric.unwrap_or(f64::INFINITY);
             let cells = comparison.weights.unresolved.hypot(comparison.by_cells[1]);
             let reach = noise.reach(sigmas, 1.0).hypot(sigmas * geometric).hypot(sigmas * cells);

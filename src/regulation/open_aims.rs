@@ -65,7 +65,7 @@ pub(super) fn judge_by_open_aims(
     for (reading, spread) in
         rows.iter_mut().zip(spread).filter_map(|(row, spread)| Some((row.reading.as_mut()?, spread)))
     {
-        // What facets and cells change is part of both readings; where nobody knows what facets do, it is in neither.
+        // What facets and cells change is part of both readings; where the change by facets is unknown, it is in neither.
         let others = reading.geometric.map_or(0.0, |geometric| geometric.powi(2)) + reading.cells.powi(2);
         let apart = (spread.powi(2) - others).max(0.0).sqrt();
         reading.statistical = reading.statistical.max(apart);

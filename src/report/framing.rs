@@ -55,8 +55,8 @@ pub(super) fn joined_cells(grid: &Grid) -> Option<(Grid, [usize; 2])> {
     Some((grid, block))
 }
 
-/// Returns the value up to which a cell is dark. Over all directions there is some stray light everywhere: what lies below the lowest
-/// isocandela line is none that a luminaire is framed by.
+/// Returns the value up to which a cell is dark. Over all directions there is some stray light everywhere: light below the lowest
+/// isocandela line does not count for the frame of a luminaire.
 fn dark_value(grid: &Grid, peak: f64) -> f64 {
     let lowest = round_levels(peak).first().copied().filter(|_| is_all_around(grid));
     lowest.unwrap_or(DARK * peak)

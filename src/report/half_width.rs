@@ -26,7 +26,7 @@ fn distance_to(level: f64, values: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 /// Returns the width of a line of values, each with its error where these are known, over which it stays above half of the largest; `None`
-/// where that is up to the end on a side.
+/// where that reaches the end on a side.
 pub(super) fn half_width(values: &[f64], errors: Option<&[f64]>) -> Option<HalfWidth> {
     let peak = (0..values.len()).max_by(|a, b| values[*a].total_cmp(&values[*b]))?;
     let half = 0.5 * values[peak];

@@ -1,6 +1,6 @@
 //! The file of a part of a run.
 //!
-//! It holds a line that names it, a header of whoever writes it, the replicates, the sums without their empty cells, and a checksum. Whole
+//! It holds a line that names it, a header of the writer's, the replicates, the sums without their empty cells, and a checksum. Whole
 //! numbers are little-endian.
 
 use super::bind::BoundScene;

@@ -20,7 +20,7 @@ const MOST_RAYS_LOG2: u32 = 21;
 /// Most quanta of one ray: whole numbers up to 2⁵³ are exact.
 const HEAVIEST_RAY: f64 = (1u64 << 53) as f64;
 
-/// Quanta of a ray from which on the rounding of its power is nobody's concern: 5e-10 of it.
+/// Quanta of a ray from which on the rounding of its power is negligible: 5e-10 of it.
 const FINE_RAY: f64 = (1u64 << 30) as f64;
 
 /// Most quanta of a replicate, half of what its words of 63 bits hold.

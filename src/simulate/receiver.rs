@@ -175,7 +175,7 @@ impl Receiver {
         Aabb::from_points([frame.origin - reach, frame.origin + reach])
     }
 
-    /// Whether it may have a point in common with a box; a `true` in vain costs time alone. Always `false` for far fields and absorbed
+    /// Whether it may have a point in common with a box; a false positive only costs time. Always `false` for far fields and absorbed
     /// power, which stand nowhere.
     pub(crate) fn meets(&self, region: &Aabb) -> bool {
         match &self.shape {

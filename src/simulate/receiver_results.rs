@@ -41,7 +41,7 @@ pub struct ReceiverResult {
     pub rms_error: [f64; 2],
     /// Largest distance from the centre, in the same units.
     pub farthest: f64,
-    /// Files written for it; whoever writes them fills this in.
+    /// Files written for it; filled in by the writer.
     pub files: Vec<String>,
     /// Half sides: mm of a plane, degrees of angles; of a disc its radius, twice.
     pub half: [f64; 2],

@@ -33,7 +33,7 @@ pub struct Results {
     pub replicates: u32,
     /// Power of a ray, as it leaves, of the source whose rays carry most.
     pub heaviest_ray: f64,
-    /// Seconds of each stage; whoever read and built the scene fills in those but `trace`.
+    /// Seconds of each stage; all but `trace` are filled in by the caller that read and built the scene.
     pub seconds: Seconds,
     /// Nearest-hit queries of all rays.
     pub segments: u64,

@@ -71,7 +71,7 @@ impl TrimRegion {
         (!self.bands.is_empty()).then_some(self.bounds)
     }
 
-    /// Whether the box between two corners may hold a point inside the loops; a `true` in vain costs time alone.
+    /// Whether the box between two corners may hold a point inside the loops; a false positive only costs time.
     pub(crate) fn may_reach(&self, low: Uv, high: Uv) -> bool {
         if self.bands.is_empty() {
             return true;

@@ -119,7 +119,7 @@ pub enum TracedGeometry<'a> {
     Spline,
     /// On facets, whose errors were measured.
     Facets(&'a GeometricError),
-    /// On facets that nobody compared with the spline.
+    /// On facets that were not compared with the spline.
     Unmeasured,
 }
 

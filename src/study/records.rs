@@ -5,7 +5,7 @@
 use crate::math::{Point, Ray, Vector};
 use std::io::{self, Read, Write};
 
-/// A direction this close to unit length is kept as it is: written with six digits by whoever made the file.
+/// A direction this close to unit length is kept as it is: the file may give six digits.
 const UNIT_LENGTH: f64 = 1e-6;
 
 /// Bytes of one record.

@@ -11,7 +11,7 @@ use crate::simulate::{BoundScene, Power, RunSettings};
 const NET_ORDER: f64 = 0.6;
 /// The same of independent random numbers, and of cells, each of which few rays reach.
 const RANDOM_ORDER: f64 = 0.5;
-/// Errors below this share of a figure are nobody's concern.
+/// Errors below this share of a figure are negligible.
 const NEGLIGIBLE: f64 = 1e-6;
 /// Ratio up to which two figures are as wrong as one another.
 const AS_WRONG: f64 = 1.01;

@@ -15,10 +15,10 @@ const SHARPEST_PLACES: f64 = 0.1;
 /// Pieces in which a curve of a trim is looked at.
 const TRIM_STEPS: u32 = 8;
 /// How many times the cells that a face is expected to need it may have: [`expected_cells`] estimates from below, and halving makes each
-/// side of a cell up to half as long as need be, as on a torus, which takes 4.2 times.
+/// side of a cell as short as half the necessary length, as on a torus, which takes 4.2 times.
 pub(super) const TIMES_EXPECTED: f64 = 8.0;
 /// How many times the cells that are expected of an angle a face may take: diagonals turn farther than sides, halving makes cells smaller
-/// than need be, and the border takes some.
+/// than necessary, and the border takes some.
 const TIMES_OF_ANGLE: f64 = 10.0;
 /// Cells that any face may have for an angle.
 const LEAST_GRANTED: f64 = 2000.0;

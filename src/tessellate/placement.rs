@@ -84,7 +84,7 @@ fn place_face(out: &mut Tessellation, instance: &Instance, shared: u32, face: &F
         let vertices = oriented_corners(facet.corners.map(|c| c + first), frame);
         out.mesh.facets.push(Facet { vertices, face: id });
         let (bound, tolerance) = (facet.bound * frame.scale, facet.tolerance * frame.scale);
-        // Compared after scaling, as whoever reads both numbers compares them.
+        // Compared after scaling, as a reader of both numbers would.
         let certified = bound <= tolerance;
         out.mesh.sag.push(if certified { bound } else { f64::INFINITY });
         out.quality.push(FacetQuality { tolerance, bound, certified });

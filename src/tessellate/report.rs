@@ -58,7 +58,7 @@ pub struct Report {
     pub failed: Vec<FailedFace>,
     /// Times.
     pub seconds: Seconds,
-    /// Filled in by whoever knows the process; bytes.
+    /// Peak memory of the process, bytes; filled in by the caller.
     pub peak_bytes: Option<u64>,
 }
 
@@ -185,7 +185,7 @@ impl std::fmt::Display for FailureCause {
 /// Times in seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Seconds {
-    /// Reading the file; filled in by whoever read it.
+    /// Reading the file; filled in by its reader.
     pub read: f64,
     /// Tessellating.
     pub tessellate: f64,

@@ -1,4 +1,4 @@
-//! Lists of sentences that are alike, so long that nobody reads all of them.
+//! Lists of similar sentences that are too long to print in full.
 
 /// Returns the first `most` of these sentences and, where there are more, the one that `rest` makes of how many more.
 pub(crate) fn first_sentences(

@@ -127,7 +127,7 @@ fn triangulate_faces(shell: TruckShell, tolerance: f64, limit: Duration) -> Opti
     let pool = pool.build().ok()?;
     let (send, receive) = channel();
     let waiting = move || {
-        // Nobody may be waiting any more.
+        // The receiver may be gone.
         let _ = send.send(catch_unwind(AssertUnwindSafe(|| pool.install(work))).ok());
     };
     std::thread::Builder::new().name(THREAD.into()).spawn(waiting).ok()?;

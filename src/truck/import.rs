@@ -52,7 +52,7 @@ pub fn solid(name: &str, solid: &modeling::Solid) -> Conversion {
 /// Returns the model of a shell; normals are those of truck's faces, turned outward when the shell is closed.
 pub fn shell(name: &str, shell: &modeling::Shell) -> Conversion {
     let mut made = Maker::default();
-    // Of an open shell nobody can say which side is out.
+    // An open shell has no outside.
     let closed = shell.shell_condition() == modeling::ShellCondition::Closed;
     made.shell(shell, closed);
     made.finish(name)

@@ -40,7 +40,7 @@ pub(crate) fn run(
     set_threads(None)?;
     let usual_name = PathBuf::from(last_component(file)).with_extension("toml");
     let scene_file = output.unwrap_or(&usual_name).to_path_buf();
-    // Whoever reads the file goes by the end of its name.
+    // Readers of the file go by its extension.
     if lower_extension(&scene_file) != "toml" {
         let failure = Failure::arguments(format!("-o {}: the name of a scene ends in .toml", scene_file.display()));
         let is_folder = scene_file.is_dir() || scene_file.file_name().is_none();

@@ -79,7 +79,7 @@ fn read_ledger(text: &str, request: &mut ReplayRequest) -> Result<(), String> {
             return Err(format!("line {}: no run has {rays} rays", k + 2));
         }
         let run = LedgerRun { seed, rays, grows };
-        // One ledger is of one run; of two nobody could say which seed holds.
+        // One ledger is of one run; with two the seed would be ambiguous.
         if request.run.replace(run).is_some_and(|other| other != run) {
             return Err(format!("line {}: another seed, number of rays or plan than the lines before", k + 2));
         }

@@ -79,7 +79,7 @@ impl StudyResult {
     }
 }
 
-/// Refuses options that a study would not look at: whoever gives one believes that it changes the rows.
+/// Refuses options that a study would ignore: a user who gives one expects it to change the rows.
 fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
     use StudyKind::{Accuracy, Bvh, Complexity, Effects, Stability};
     let kind = command.kind;

@@ -222,7 +222,7 @@ fn trace_whole(
         Ok(run) => run,
         Err(partial) => {
             let failed = paths.and_then(PathFile::failure).map(|e| e.to_string());
-            // Of rays that are traced already there are no paths to be had.
+            // Rays that are traced already have no recorded paths.
             let again = if extra.paths.is_some() { RESUME_WITHOUT_PATHS } else { RESUME };
             return Err(checkpoint.save_stopped(&partial, failed.as_deref(), again));
         }

@@ -54,7 +54,7 @@ pub(crate) fn print_results(
     Ok(())
 }
 
-/// Says what whoever reads the results of a run must know, a line each, without what was `said` before it.
+/// Prints the notes that a reader of the results must know, a line each, without those `said` before.
 pub(crate) fn say_notes(notes: &[String], said: &[String], console: &Console) {
     let said: HashSet<&String> = said.iter().collect();
     notes.iter().filter(|note| !said.contains(note)).for_each(|note| console.say(note));

@@ -159,7 +159,7 @@ impl<'a> Checkpoint<'a> {
         Err(failure.with_help("give another place with -o, or remove the file"))
     }
 
-    /// Returns the commands that the run is owed to: those of the file that was gone on from, as far as it is the same run.
+    /// Returns the commands that traced the run: those of the continued file, as far as it is the same run.
     pub(crate) fn commands(&self) -> RunCommands {
         let earlier = self.place.earlier();
         earlier.as_ref().map_or_else(|| self.header.commands.clone(), |earlier| self.header.commands_after(earlier))
@@ -210,7 +210,7 @@ impl<'a> Checkpoint<'a> {
         Ok(write_atomic(file, |w| sum.write(&header, w))?)
     }
 
-    /// Returns the header with what the run took so far, earlier processes included, and the commands that it is owed to.
+    /// Returns the header with what the run took so far, earlier processes included, and the commands that traced it.
     fn header_now(&self) -> TallyHeader {
         let wall_seconds = self.place.console.started.elapsed().as_secs_f64();
         let of_process = Usage::of_process(wall_seconds, self.prepared.threads);

@@ -289,7 +289,7 @@ mod tests {
         drop(OutputPlace::file(&folder.join("2.tally")).unwrap());
         drop((first, shard));
         assert_eq!(fs::read_dir(&folder).unwrap().count(), 0);
-        // Left by a process that was killed: nobody holds its lock.
+        // Left by a process that was killed: its lock is free.
         fs::write(folder.join(FOLDER_LOCK), "4294967295").unwrap();
         drop(OutputPlace::folder(&folder).unwrap());
     }

@@ -282,7 +282,7 @@ mod tests {
         let mut sum = PartSum::new(asked);
         let done = |sum: &mut PartSum, files: &[PathBuf]| sum.add_new(files, &bound).map(|sum| sum.done.clone());
         assert_eq!(done(&mut sum, &files[..1]).ok(), Some(vec![0]));
-        // Of the same length and time it is not looked into again, though nobody could read it.
+        // Of the same length and time it is not read again, even if it was unreadable.
         let length = std::fs::metadata(&files[0]).unwrap().len() as usize;
         let modified = std::fs::metadata(&files[0]).unwrap().modified().unwrap();
         std::fs::write(&files[0], vec![b'x'; length]).unwrap();

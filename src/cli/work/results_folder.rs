@@ -110,9 +110,9 @@ fn remove_earlier(prepared: &PreparedScene, folder: &Path) {
 pub(crate) struct RunRemarks {
     /// Sentences of the report that compare the run with what was asked for or others found, in Markdown.
     pub(crate) sentences: Vec<String>,
-    /// What came of the error that was asked for, if one was.
+    /// The outcome of the error target, if one was set.
     pub(crate) target: Option<TargetResult>,
-    /// The commands that it is owed to.
+    /// The commands that traced it.
     pub(crate) commands: RunCommands,
 }
 

@@ -1,4 +1,4 @@
-//! The commands that a run is owed to: its results name them, and so does the file that it is saved in.
+//! The commands that traced a run: its results name them, and so does the file that it is saved in.
 
 use crate::cli::console::Console;
 use crate::report::Provenance;
@@ -6,7 +6,7 @@ use crate::text::natural_order;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-/// The commands that a run is owed to.
+/// The commands that traced a run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct RunCommands {
     /// The one that began the run.

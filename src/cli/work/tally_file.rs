@@ -61,7 +61,7 @@ pub(crate) struct TallyHeader {
     /// Faces that are listed with what they absorb and let through; 0 where that is not counted.
     #[serde(default)]
     pub(crate) faces: u32,
-    /// What it is owed to.
+    /// The commands that traced it.
     #[serde(flatten)]
     pub(crate) commands: RunCommands,
     /// The program that traced it; empty in files of earlier versions.
@@ -130,12 +130,12 @@ impl TallyHeader {
         Self { usage, ..self.clone() }
     }
 
-    /// Returns the same header of a run that is owed to other commands.
+    /// Returns the same header for a run that other commands traced.
     pub(crate) fn with_commands(self, commands: RunCommands) -> Self {
         Self { commands, ..self }
     }
 
-    /// Returns the commands that this run is owed to where its process goes on from a file with the `earlier` header: with the very run, or
+    /// Returns the commands that traced this run where its process goes on from a file with the `earlier` header: with the very run, or
     /// by a search that has come to a longer one since.
     pub(crate) fn commands_after(&self, earlier: &Self) -> RunCommands {
         let own = self.commands.clone();

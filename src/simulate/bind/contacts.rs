@@ -99,7 +99,7 @@ pub(super) fn media_on_opaque(scene: &Scene, model: &Model, of_face: &[u32], opa
             let near = around.grown(glue);
             touch = points.iter().filter(|p| near.contains(**p)).any(|p| {
                 distances += 1;
-                // Out of work, boxes decide: a face that is marked in vain costs time, one that is missed costs rays.
+                // Out of work, boxes decide: a face marked without need costs time, a missed one costs rays.
                 distances > MOST_DISTANCES || nearest.is_within(other, *p, glue)
             });
         }

@@ -7,7 +7,7 @@ use crate::simulate::scene::{Key, Scene};
 use crate::simulate::{Error, ErrorKind};
 
 /// Returns the placement of the instance that `name` fits, of the only instance of a part that it fits, or of the `[[model]]` entry called
-/// so; the identity without a name. `of` is the place in the scene of whoever has the key `frame`, for messages.
+/// so; the identity without a name. `of` is the place in the scene of the entry with the key `frame`, for messages.
 ///
 /// # Errors
 /// When nothing is called so, or several are.

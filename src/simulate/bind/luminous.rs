@@ -91,7 +91,7 @@ impl<'m> LuminousSearch<'m> {
             return Err(scene.error(ErrorKind::NoMatch, &base, "these faces have no area to shine from"));
         };
         let source = scene.source_label(index);
-        // Whoever writes the kind means it.
+        // A stated kind is intended.
         let is_written = self.written_kinds.get(index).copied().unwrap_or(false);
         let is_default = scene.sources[index].kind == SourceKind::Point && !is_written;
         self.notes.even.extend(is_default.then(|| even_note(&source)));

@@ -288,7 +288,7 @@ pub(super) fn dark_far_field_note(bound: &BoundScene) -> Option<String> {
 }
 
 /// Returns one sentence about the first body none of whose faces lets light through, where the rule that gave it a surface stands above the
-/// one that gave it its medium: whoever wrote the medium last means it to be seen. `None` where there is no such body.
+/// one that gave it its medium: a medium written last is meant to be seen. `None` where there is no such body.
 pub(super) fn shut_body_note(bound: &BoundScene, rules: &[FaceRules]) -> Option<String> {
     let is_clear = |face: &FaceOptics| !bound.surfaces[usize::from(face.surface)].is_opaque();
     let clear: BTreeSet<u32> = bound.faces.iter().filter(|face| is_clear(face)).map(|face| face.body).collect();

@@ -1,4 +1,4 @@
-//! Random numbers by key, not by turn: any number of any ray can be had at any time on any thread.
+//! Random numbers by key, not in sequence: any number of any ray can be drawn at any time on any thread.
 //!
 //! A number is a function of (seed, ray, branch, bounce, purpose) alone. So a result does not depend on threads, batches or
 //! shards, and a kernel that skips an effect draws the same numbers for all other effects as one that does not.

@@ -3,7 +3,7 @@
 /// Makes 128 random bits from a 128-bit counter and a 64-bit key, by ten rounds of Philox 4×32.
 ///
 /// Salmon, Moraes, Dror, Shaw, *Parallel random numbers: as easy as 1, 2, 3*, SC 2011. Passes BigCrush; stateless, so any number of any ray
-/// can be had in any order on any thread.
+/// can be drawn in any order on any thread.
 #[inline]
 pub fn philox4x32(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
     ten_rounds(counter, key)

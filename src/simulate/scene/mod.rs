@@ -237,8 +237,8 @@ impl Scene {
         Ok(())
     }
 
-    /// Refuses two entries of one name in the list `key`, by which nobody could distinguish them; several may have none. `kind` is what
-    /// they are called in a sentence.
+    /// Refuses two entries of one name in the list `key`, which would be ambiguous; several may have none. `kind` is what they
+    /// are called in a sentence.
     fn check_names<'a>(&self, key: &str, kind: &str, names: impl Iterator<Item = &'a str>) -> Result<(), Error> {
         let mut known = HashSet::new();
         for (i, name) in names.enumerate().filter(|(_, name)| !name.is_empty()) {

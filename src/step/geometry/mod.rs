@@ -1,8 +1,8 @@
 //! Curves and surfaces of the file, in mm and radians.
 //!
-//! Source: ISO 10303-42. A curve becomes a closed form where there is one and a rational spline else (`curves`, `composite`, `joints`,
+//! Source: ISO 10303-42. A curve becomes a closed form where there is one, else a rational spline (`curves`, `composite`, `joints`,
 //! `pcurves`), an edge the part of its curve between its vertices (`edges`, `closing`), a surface a chart (`surfaces`, `elementary`,
-//! `swept_surfaces`). What cannot be had is a [`Refusal`] that names the entity and the reason. Curves may lie on surfaces and surfaces
+//! `swept_surfaces`). What cannot be read is a [`Refusal`] that names the entity and the reason. Curves may lie on surfaces and surfaces
 //! be swept from curves: the readers call each other as methods of [`GeometryReader`], their types do not depend on each other.
 
 pub(super) mod closing;
@@ -31,7 +31,7 @@ pub(crate) const FARTHEST_MM: f64 = 1e12;
 /// Largest components of a direction whose squares neither vanish nor overflow.
 const EXACT_LENGTHS: std::ops::Range<f64> = 1e-100..1e100;
 
-/// Why a piece of geometry cannot be had: the entity and the reason.
+/// Why a piece of geometry cannot be converted: the entity and the reason.
 #[derive(Clone, Debug)]
 pub(crate) struct Refusal {
     /// The `#id` that is to blame.

@@ -33,7 +33,7 @@ const LARGEST_JOINED_GAP_MM: f64 = 0.05;
 /// Edges of a face whose points are asked for where a surface is sized by them.
 const ASKED_EDGES: usize = 64;
 
-/// Converts the shapes of a representation into a part, in mm; never fails: faces that cannot be had are refused, one by one.
+/// Converts the shapes of a representation into a part, in mm; never fails: faces that cannot be converted are refused one by one.
 pub(crate) fn convert(
     file: &File<'_>,
     units: Units,

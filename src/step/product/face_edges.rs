@@ -27,7 +27,7 @@ pub(super) struct FaceEdges<'e> {
     pub(super) repairs: Vec<&'static str>,
 }
 
-/// Collects the edges of a face that have a length, and puts each loop in order; fails with the first edge that cannot be had.
+/// Collects the edges of a face that have a length, and puts each loop in order; fails with the first edge that cannot be converted.
 pub(super) fn face_edges<'e>(
     plan: &FacePlan,
     edges: &'e [Outcome<TrimmedEdge>],

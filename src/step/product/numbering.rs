@@ -20,7 +20,7 @@ pub(crate) struct ConvertedPart {
     pub(crate) part: Part,
     /// Faces that the file has, distinct, the refused ones included.
     pub(crate) found: usize,
-    /// Why faces could not be had.
+    /// Why faces were refused.
     pub(crate) refused: Vec<Refusal>,
     /// Faces that were repaired, and how.
     pub(crate) repaired: Vec<Refusal>,

@@ -7,8 +7,8 @@ use rustc_hash::FxHashSet;
 
 impl Assembly<'_, '_> {
     /// Returns the representations that no product has `reached` and no item maps: in the order of the file, first those that no other of
-    /// them places by a transformation. Whoever places them in this order, and each only where nothing has reached it by then, places none
-    /// once more at the origin; what is left to the end is parts of cycles.
+    /// them places by a transformation. A caller that places them in this order, each only if nothing has reached it by then, places none
+    /// a second time at the origin; the last ones are parts of cycles.
     pub(super) fn orphans(&self, reached: &FxHashSet<u64>) -> Vec<u64> {
         let shapes = self.file.entities_of_kind(is_shape_representation).map(|e| e.id);
         let unreached: Vec<u64> = shapes.filter(|id| !reached.contains(id)).collect();

@@ -54,7 +54,7 @@ pub(super) fn convert_recipes(
     }
 }
 
-/// Trims every face of the solid `id`, and returns its edges and faces; one face that cannot be had refuses the solid.
+/// Trims every face of the solid `id`, and returns its edges and faces; one face that cannot be trimmed refuses the solid.
 fn trim_faces(
     geometry: &GeometryReader<'_, '_>,
     id: u64,

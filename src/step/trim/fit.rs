@@ -59,7 +59,7 @@ pub(crate) struct Target<'t> {
     pub(crate) poles: &'t [Pole],
     /// What the curve must not leave; infinite where the surface has no border.
     pub(crate) range: [[f64; 2]; 2],
-    /// Differences after which the surface repeats and which of them `locate` takes is up to what is expected.
+    /// Periods of the surface; `locate` chooses among its repeats by the expected parameters.
     pub(crate) period: [Option<f64>; 2],
     /// Nearer than this is at the pole, mm.
     pub(crate) pole_tolerance: f64,

@@ -190,7 +190,7 @@ impl<'a> Classifier<'a> {
             return Cause::Tangent;
         }
         let facet_first = match (facet, exact) {
-            // Whoever hits first saw something that the other did not, at a place that is known.
+            // The first hit shows something that the other missed, at a known place.
             (Some(f), Some(e)) => f.t < e.t,
             (f, _) => f.is_some(),
         };
@@ -206,7 +206,7 @@ impl<'a> Classifier<'a> {
         let later = |o: &Hit| LaterHit { t: o.t, band: self.band(o.face, ray, surface.gap) };
         let other_face = other.filter(|o| o.face != first.face).map(later).or(elsewhere);
         let cause = self.cause(ray, first, (same_face, other_face), surface, sag);
-        // Facets that the mesher itself does not vouch for, and that stray farther than requested: that is measured here.
+        // Facets that the mesher could not prove, and that stray farther than requested: that is measured here.
         if matches!(cause, Cause::Unexplained(_)) {
             let measured = self.unproved_sag(ray, first, facet);
             let others = (same_face, other_face);

@@ -41,7 +41,7 @@ pub fn measure(intersectors: &[TimedIntersector<'_>], rays: &[Ray], rounds: usiz
                         *hit = intersector.intersect(ray, &mut cost);
                     }
                 }
-                // Without it the compiler could leave out hits that nobody reads.
+                // Without it the compiler could leave out unused hits.
                 black_box(hits);
             }
         });

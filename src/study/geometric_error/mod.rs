@@ -164,7 +164,7 @@ impl GeometricError {
                 place.error = place.error.hypot(share * width.spline);
             }
         }
-        // Of what nobody asked for, as little as of all light; its figures have one ray more where they are reported.
+        // All other figures get the share of one ray of all light, and one ray more where they are reported.
         let share = 1.0 / self.rays.max(1) as f64;
         self.power.each_mut().into_iter().for_each(|end| end.add_unseen(share));
         self.absorbed.iter_mut().for_each(|a| a.power.add_unseen(share));

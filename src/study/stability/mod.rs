@@ -79,7 +79,7 @@ mod tests {
         }
     }
 
-    /// Grades a chord of a ball of 1 mm, at this sine to the surface that it leaves, for whoever finds its start and loses its end.
+    /// Grades a chord of a ball of 1 mm, at this sine to the surface that it leaves, where the intersector finds only its start.
     fn grade_of_lost_chord(sine: f64, certainty: Certainty) -> Grade {
         let toward = Ray::new(Point::ZERO, Vector::X);
         let direction = Vector::new(-sine, (1.0 - sine * sine).sqrt(), 0.0);
@@ -102,7 +102,7 @@ mod tests {
         assert_eq!(grade_of_lost_chord(0.5, Certainty::Certified), Grade::Wrong);
         // From a hit that is not sure the chord may run another way, whether it is met or lost.
         assert_eq!(grade_of_lost_chord(0.5, Certainty::Uncertified), Grade::Flagged);
-        // So flat that the surface would hide it by a move of 5e-19 mm: nobody knows.
+        // So flat that the surface would hide it by a move of 5e-19 mm: undecided.
         assert_eq!(grade_of_lost_chord(1e-9, Certainty::Certified), Grade::Right);
     }
 }
