@@ -1,4 +1,4 @@
-//! What is asked of a trace beside the scene.
+//! The settings of a trace beside the scene.
 
 use crate::errors::{SceneError, of_pipeline};
 use crate::names::{normal_mode, require_tolerance};

@@ -18,7 +18,7 @@ use pyo3::prelude::*;
 use serde_json::{Value, json};
 use std::sync::Arc;
 
-/// What is asked of a study; each takes what it has a use for.
+/// The settings of a study; each study takes those that it uses.
 #[derive(Clone)]
 struct Request {
     name: String,
