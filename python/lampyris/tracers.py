@@ -68,7 +68,7 @@ class _Tracer:
 class Octree(_Tracer):
     """The octree over the facets of a mesh.
 
-    ``normals`` is how the normal at a hit is got: flat, nearest, bilinear or cubic; with ``exact`` every hit is moved to the spline of
+    ``normals`` is how the normal at a hit is computed: flat, nearest, bilinear or cubic; with ``exact`` every hit is moved to the spline of
     ``model``.
     """
 

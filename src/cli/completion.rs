@@ -1,6 +1,6 @@
-//! How a command ended that ended without an error.
+//! Outcome of a command that ended without an error.
 
-/// How a command ended, where it ended without an error.
+/// Outcome of a command that ended without an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Completion {
     /// Exit code 0.

@@ -34,7 +34,7 @@ pub(crate) struct Console {
     pub(crate) started: Instant,
     colour: bool,
     terminal: bool,
-    /// What is not said a second time.
+    /// Messages that are not repeated.
     said: Mutex<BTreeSet<String>>,
 }
 

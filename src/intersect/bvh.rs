@@ -57,7 +57,7 @@ pub enum Kind {
     CwBvh,
 }
 
-/// How much time the build may take.
+/// Quality of the build, against its time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Quality {
     /// `BvhBuildParams::medium_build`.
@@ -67,7 +67,7 @@ pub enum Quality {
     VerySlow,
 }
 
-/// What to build.
+/// Settings of a [`Bvh`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Binary or eight-wide.
@@ -76,7 +76,7 @@ pub struct Settings {
     pub quality: Quality,
     /// Whether the defects named in the module's notes are mended; otherwise the crate is used as shipped, in f32.
     pub cured: bool,
-    /// How the normal at a hit is got.
+    /// How the normal at a hit is computed.
     pub normals: NormalMode,
     /// Largest coordinate that starts were rounded at, mm, where that is not the mesh's own: of a part in its own coordinates that
     /// stands far away. 0 otherwise.
@@ -124,7 +124,7 @@ pub struct Bvh<'m> {
     build_seconds: f64,
 }
 
-/// What is tested at a leaf, in the tree's order.
+/// The primitives of the leaves, in the tree's order.
 enum Leaves {
     Shipped(Vec<RtTriangle>),
     Cured(Vec<[Point; 4]>),

@@ -28,7 +28,7 @@ use std::hint::select_unpredictable;
 /// How far from where it should be a start may lie, relative to the largest coordinate: see [`Surroundings::new`].
 const REACH: f64 = 1.0 / (1u64 << 40) as f64;
 
-/// What the test knows of the mesh as a whole.
+/// The mesh and its tolerances, as the facet test needs them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Surroundings<'m> {
     pub(crate) mesh: &'m FacetMesh,

@@ -102,7 +102,7 @@ pub struct ExpectedRays<'a> {
     pub sag: f64,
 }
 
-/// What rays of a source have in common.
+/// The common geometry of a source's rays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Beam {
     /// They start at one point, mm.
@@ -133,7 +133,7 @@ pub struct Hit {
     pub triangle: Option<QuadHalf>,
     /// Parameters on the face's surface.
     pub uv: Uv,
-    /// How sure it is.
+    /// Its certainty.
     pub certainty: Certainty,
 }
 
@@ -145,7 +145,7 @@ impl Hit {
     }
 }
 
-/// How sure a hit is.
+/// Certainty of a hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Certainty {
@@ -210,7 +210,7 @@ impl std::ops::Add for Footprint {
     }
 }
 
-/// How the normal at a facet hit is got.
+/// How the normal at a facet hit is computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum NormalMode {
     /// Of the flat triangle.

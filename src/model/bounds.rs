@@ -40,7 +40,7 @@ const SIDES: [Side; 6] = [
 ];
 
 impl Side {
-    /// How far a point lies towards this side, mm from the origin.
+    /// Distance of a point towards this side, mm from the origin.
     fn height(self, p: Point) -> f64 {
         self.sign * p[self.axis]
     }

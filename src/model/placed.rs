@@ -24,7 +24,7 @@ pub struct Instance {
     /// Names of the occurrences that it is placed through, from the outermost down to its own, as `left/led`; alike ones are numbered.
     /// Empty where no file says.
     pub path: String,
-    /// What is placed.
+    /// The part that is placed.
     pub part: PartId,
     /// From the part's coordinates to the model's.
     pub placement: Frame,

@@ -10,7 +10,7 @@ use std::ops::{Add, Mul, Sub};
 pub trait ControlPoint:
     Copy + PartialEq + Add<Output = Self> + Sub<Output = Self> + Mul<f64, Output = Self>
 {
-    /// What it projects to.
+    /// The type of its projection.
     type Position: Copy
         + PartialEq
         + Add<Output = Self::Position>

@@ -58,7 +58,7 @@ pub enum Defect {
     Torn,
 }
 
-/// What had to be changed.
+/// Changes that were necessary.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Repairs {
     /// The spline was unclamped.

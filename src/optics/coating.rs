@@ -8,12 +8,12 @@ use super::table::{bracket, check_increasing};
 /// By what two shares may add up to more than one: each was rounded to three digits or more.
 const SUM_ROUNDING: f64 = 1e-3;
 
-/// What each may be.
+/// Range of each share.
 const SHARE: &str = "from 0 to 1, as 0.95 for 95 %";
-/// What both together may be.
+/// Limit of their sum.
 const AT_MOST_ONE: &str = "at most 1 (a thousandth more is taken for rounding)";
 
-/// What an interface does to the power that meets it.
+/// How an interface divides the incident power.
 ///
 /// ```
 /// use lampyris::optics::Coating;

@@ -233,7 +233,7 @@ impl Cache {
     }
 }
 
-/// What a cache holds of one scene and one way to mesh it.
+/// The entries of a cache for one scene and one way to mesh it.
 #[derive(Clone, Copy)]
 pub(super) struct CachedFacets<'a> {
     pub(super) cache: &'a Cache,

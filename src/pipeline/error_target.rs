@@ -20,7 +20,7 @@ const GROWTH_FROM_NOTHING: f64 = 16.0;
 /// No answer asks for more rays than these: a machine's word holds them.
 const MOST_WANTED: f64 = 1e18;
 
-/// What is asked for.
+/// The error to reach.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorTarget {
     /// Relative error, percent.
@@ -31,7 +31,7 @@ pub struct ErrorTarget {
     pub cells: bool,
 }
 
-/// What came of it.
+/// The outcome.
 #[derive(Clone, Debug, Serialize)]
 pub struct TargetResult {
     /// Name of the receiver.

@@ -16,12 +16,12 @@ use crate::simulate::Scene;
 use crate::tessellate::GroupedFacets;
 use std::sync::Arc;
 
-/// What finds the hits, and how the normal there is got.
+/// The intersector, and how normals at hits are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct IntersectorChoice {
-    /// What finds the hits.
+    /// The intersector.
     pub intersector: IntersectorKind,
-    /// How the normal there is got.
+    /// How normals at hits are computed.
     pub normals: NormalMode,
 }
 

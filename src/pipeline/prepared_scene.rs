@@ -52,7 +52,7 @@ pub struct PreparedScene {
     pub mesh_settings: tessellate::Settings,
     /// Seconds that the facets took.
     pub tessellation_seconds: f64,
-    /// What finds the hits.
+    /// The intersector.
     pub choice: IntersectorChoice,
     /// Threads that trace.
     pub threads: usize,

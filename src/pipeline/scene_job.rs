@@ -26,7 +26,7 @@ pub struct SceneJob {
     pub meshing: MeshingSettings,
     /// How it is traced.
     pub tracing: TracingSettings,
-    /// How an accuracy that was asked for was reached.
+    /// How a requested accuracy was reached.
     pub accuracy: Option<AccuracyResult>,
     /// What another part chose, which is taken in place of a pilot where that part is of the same run.
     pub chosen: Option<PartChoice>,
@@ -34,7 +34,7 @@ pub struct SceneJob {
     pub cache: Option<Cache>,
 }
 
-/// What a part of a run chose.
+/// The choice of a part of a run.
 #[derive(Clone, Debug)]
 pub struct PartChoice {
     /// The choice, with what its pilot found.

@@ -27,7 +27,7 @@ pub struct MeshingSettings {
     pub plan: Option<TolerancePlan>,
 }
 
-/// How rays are traced; what is not said here the scene says.
+/// How rays are traced; the scene decides what is left open here.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TracingSettings {
     /// Rays of the run.
@@ -36,9 +36,9 @@ pub struct TracingSettings {
     pub seed: Option<u64>,
     /// Threads that trace; as many as the machine has where none are asked for.
     pub threads: Option<usize>,
-    /// What finds the hits.
+    /// The intersector.
     pub intersector: Option<IntersectorKind>,
-    /// How the normal at a hit is got.
+    /// How the normal at a hit is computed.
     pub normals: Option<NormalMode>,
 }
 
@@ -98,7 +98,7 @@ pub struct RayRange {
     pub end: u64,
 }
 
-/// What finds the hits.
+/// The intersector.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum IntersectorKind {
     /// The octree on facets.

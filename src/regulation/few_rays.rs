@@ -52,7 +52,7 @@ pub(super) fn student_t(sigmas: f64, replicates: u32) -> f64 {
     (freedom * (z * z / freedom).min(LARGEST_EXPONENT).exp_m1()).sqrt()
 }
 
-/// What may land in a cell and is not seen there.
+/// Light that may land in a cell and is not seen there.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LandingRay {
     /// Flux of a ray, lm.
@@ -63,7 +63,7 @@ pub(super) struct LandingRay {
     pub(super) hidden: f64,
 }
 
-/// How far the truth may lie from a reading towards its limit.
+/// Largest distance of the truth from a reading, towards its limit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Noise {
     /// What the heaviest ray that may land adds to the reading, cd; 0 where the truth lies towards fewer rays, or nothing is known of them.

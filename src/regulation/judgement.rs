@@ -6,7 +6,7 @@ use super::photometer::Photometer;
 use super::requirement::{Comparison, Requirement};
 use crate::math::error_of_maximum;
 
-/// What a row, or a lamp, comes to, from the best to the worst.
+/// Verdict on a row or a lamp, from the best to the worst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Verdict {
     /// Met, by more than three combined standard errors; of few rays, by as much as their number may be off at the same confidence.

@@ -16,7 +16,7 @@ const MOST_FOR_EXTENDED: usize = 30;
 /// Aims by which rows of many directions are judged side by side: zones take memory, on a far field of millions of cells hundreds of MB.
 const AIMS_AT_ONCE: usize = 4;
 
-/// What is remarked on rows that another open aim makes unsure: by a verdict of its own, and by none as it sees them outside.
+/// Remarks on rows that another open aim makes unsure: by a verdict of its own, and by none as it sees them outside.
 const OTHER_BY_AIM: &str =
     "by an aim that the errors of the map leave open its verdict is another; more rays decide which aim holds";
 const OUTSIDE_BY_AIM: &str = "by an aim that the errors of the map leave open it lies outside the far field";

@@ -1,4 +1,4 @@
-//! What a photometer's opening adds up of the cells below it.
+//! A photometer's opening, as weights of the cells below it.
 
 /// Cosine of the elevation that an opening's width is divided by at least, so that it stays finite at the poles.
 const LEAST_COSINE: f64 = 1e-3;
@@ -37,7 +37,7 @@ impl CellWeights {
     }
 }
 
-/// What an opening adds up of cells, not yet divided by its measure.
+/// Sums of an opening over cells, not yet divided by its measure.
 #[derive(Default)]
 pub(super) struct OpeningSum {
     pub(super) weights: CellWeights,

@@ -7,11 +7,11 @@ use super::requirement::requirements;
 use super::row::{Row, RowKind};
 use super::table::Regulation;
 
-/// What is remarked on rows whose readings have no geometric error.
+/// Remark on rows whose readings have no geometric error.
 const UNKNOWN_FACETS: &str = "it is not known what facets change here, as the cells are too many to be compared with the spline: trace \
     with fewer, or with --intersector exact";
 
-/// What is remarked on rows that no rays and no facets make sure.
+/// Remark on rows that neither rays nor facets can decide.
 const COARSE_CELLS: &str = "the width of the far field's cells alone leaves open more than lies between reading and limit: trace with \
     narrower ones";
 

@@ -59,7 +59,7 @@ pub struct Regulation {
 #[derive(Clone, Debug, Deserialize)]
 pub struct Function {
     id: String,
-    /// What the function is called.
+    /// Name of the function.
     pub name: String,
     /// How points and groups go together (FMVSS 108).
     #[serde(default, deserialize_with = "point_rule")]
@@ -139,7 +139,7 @@ pub(super) struct Realignment {
 
 /// Names that a message lists.
 const MOST_NAMED: usize = 12;
-/// What a message names where nothing is near.
+/// Examples for a message where no name is near.
 const EXAMPLES: [&str; 4] = ["UN R112 B passing", "UN R149-01 C passing", "UN R148-01 stop-S1", "FMVSS 108 LB2V"];
 
 /// A name in small letters, without spaces and dashes, which are written in many ways.

@@ -27,7 +27,7 @@ pub struct Chart {
 /// One axis of a chart.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AxisStyle {
-    /// What runs along it.
+    /// Quantity along it.
     pub label: String,
     /// Its unit, empty for pure numbers.
     pub unit: String,
@@ -75,7 +75,7 @@ pub enum Content {
     },
 }
 
-/// What is drawn over a map, in its coordinates.
+/// An overlay of a map, in its coordinates.
 #[derive(Clone, Debug, Default)]
 pub struct Marks {
     /// Lines of equal value.

@@ -6,7 +6,7 @@ use std::fmt::Write;
 /// A point or a size in units of the drawing, y downward.
 pub(super) type Place = [f64; 2];
 
-/// What a element is filled or drawn with.
+/// Colour with which an element is filled or drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Ink {
     /// The colour of the text around the drawing.

@@ -3,7 +3,7 @@
 use crate::simulate::Results;
 use crate::study::geometric_error::GeometricError;
 
-/// What stands behind the geometric errors of a run.
+/// Origin of the geometric errors of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum GeometricCause {
     /// Facets that differ from the surface, or nothing.

@@ -27,7 +27,7 @@ pub(super) struct LevelLabel {
     pub(super) at: [f64; 2],
 }
 
-/// What is written on a map.
+/// A label on a map.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct MapLabels {
     /// Sides of the points, right and down, on which their names stand; `None` where a name has no room.

@@ -95,9 +95,9 @@ pub(super) fn linear_scale([low, high]: [f64; 2], [from, to]: [f64; 2]) -> Scale
     Scale { low, high, log: false, from, to }
 }
 
-/// How strongly the lines of the grid stand against the data.
+/// Opacity of the grid lines.
 pub(super) const GRID_OPACITY: f64 = 0.13;
-/// How strongly the numbers beside the axes stand against the data.
+/// Opacity of the numbers beside the axes.
 const NUMBER_OPACITY: f64 = 0.75;
 
 /// Returns a line of the grid.

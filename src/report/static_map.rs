@@ -77,7 +77,7 @@ const LETTER_WIDTH: f64 = 0.6 * TYPE_SIZE;
 /// How far below its middle a line of text has its baseline, as a share of the height of the type.
 const BASELINE: f64 = 0.35;
 
-/// How strongly the lines of equal value stand against the map.
+/// Opacity of the isolines over the map.
 const LINE_OPACITY: f64 = 0.75;
 
 /// Draws lines of equal value with their levels, borders of zones, and named points.

@@ -36,7 +36,7 @@ pub struct ListedEnd {
     pub face: Option<u32>,
     /// Hits before.
     pub bounces: u32,
-    /// Where, mm; of light that left the scene a point on its way.
+    /// Where it ended, mm; for light that left the scene, a point on its way.
     pub point: Point,
     /// Unit direction in which it came there; zero where it ended as it began.
     pub direction: Vector,

@@ -8,7 +8,7 @@ const SQUARELESS: f64 = (1u32 << CUT) as f64;
 /// The most that rounding to whole quanta changes of the power of a ray.
 pub(super) const HALF_QUANTUM: f64 = 0.5;
 
-/// What turns the sums of a run into figures.
+/// Converts the sums of a run to figures.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PowerScale {
     /// Power of a quantum, in the unit of the sources.

@@ -66,7 +66,7 @@ pub struct Results {
     /// For each receiver the ways that light took to it; empty where the scene does not ask for them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sequences: Vec<ReceiverSequences>,
-    /// What faces absorbed and let through, where that was asked for.
+    /// Power that faces absorbed and transmitted, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub faces: Option<FaceResults>,
     /// Whether the run is divided into replicates of a fixed size, so that further ones may follow; it decides which ray bears which

@@ -109,7 +109,7 @@ fn rays_of_replicates(rays: u64, some: usize, replicates: u32) -> u64 {
     (u128::from(rays) * some as u128 / u128::from(replicates)) as u64
 }
 
-/// What the threads of a run share.
+/// Data that the threads of a run share.
 struct Work<'w, 'a> {
     context: &'w Context<'a>,
     /// For the rays that are traced once more to record their paths.

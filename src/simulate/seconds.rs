@@ -1,4 +1,4 @@
-//! What the stages of a run took.
+//! Times of the stages of a run.
 
 use serde::Serialize;
 
@@ -15,12 +15,12 @@ pub struct Seconds {
     pub trace: f64,
     /// Asking some of its rays again of BVH and spline, and comparing facets with the spline.
     pub check: f64,
-    /// What the parts of a merged run took.
+    /// Times of the parts of a merged run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub merged: Option<MergedSeconds>,
 }
 
-/// What the parts of a merged run took, from the start of each process.
+/// Times of the parts of a merged run, from the start of each process.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct MergedSeconds {
     /// Parts.

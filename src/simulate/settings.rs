@@ -1,4 +1,4 @@
-//! What a simulation is run with.
+//! Settings of a simulation.
 
 use super::scene::{Interfaces, Run, Sampling};
 use crate::optics::Effects;

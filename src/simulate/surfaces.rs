@@ -2,7 +2,7 @@
 
 use crate::optics::{Coating, Scatter};
 
-/// What a placed face is to light.
+/// Optics of a placed face.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FaceOptics {
     /// Index into the surfaces of the bound scene.
@@ -21,7 +21,7 @@ pub(crate) struct FaceOptics {
     pub(crate) medium_on_opaque: bool,
 }
 
-/// What happens at a surface, in the form the kernel reads.
+/// A surface's optics, in the form that the kernel reads.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Surface {
     Absorber,

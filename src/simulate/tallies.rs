@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 /// Most lost rays that are kept; those of the lowest index.
 pub(crate) const MOST_LOST_KEPT: usize = 1000;
 
-/// What one replicate gathered.
+/// The sums of one replicate.
 #[derive(Debug)]
 pub struct ReplicateTally {
     /// The cells of each receiver, with those of its channels behind them, in quanta.
@@ -25,7 +25,7 @@ pub struct ReplicateTally {
     pub(crate) moments: Vec<Moments>,
     /// Quanta absorbed by each face, and inside each body.
     pub(crate) absorbed: Grid,
-    /// What passes each face, where that is asked for.
+    /// Power through each face, if requested.
     pub(crate) crossings: Option<FaceCrossings>,
     pub(crate) bulk: Grid,
     pub(crate) ends: Ends,

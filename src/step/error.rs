@@ -17,7 +17,7 @@ pub enum ErrorKind {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// There are no bytes.

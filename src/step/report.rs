@@ -58,9 +58,9 @@ pub struct ImportReport {
 /// Names of units.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct UnitNames {
-    /// Of lengths.
+    /// Units of lengths.
     pub length: Vec<String>,
-    /// Of plane angles.
+    /// Units of plane angles.
     pub angle: Vec<String>,
 }
 

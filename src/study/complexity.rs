@@ -30,7 +30,7 @@ pub struct Method<'a> {
     pub prepare: Box<dyn Fn(&Model, &mut OnPrepared<'_>) + 'a>,
 }
 
-/// How many rays, and for how long.
+/// Settings: how many rays, and for how long.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Rays from the sources for the fast methods.

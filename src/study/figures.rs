@@ -9,7 +9,7 @@ use crate::optics::{MAX_EFFICACY, observer_peaks};
 use crate::simulate::{ChannelResult, ReceiverResult, Results};
 use serde::Serialize;
 
-/// What is more to blame for the error of a figure.
+/// Dominant cause of the error of a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Limit {
@@ -22,7 +22,7 @@ pub enum Limit {
 /// A figure with both its errors.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figure {
-    /// What was found.
+    /// The value found.
     pub value: f64,
     /// Its unit.
     pub unit: String,

@@ -1,4 +1,4 @@
-//! Table 2 of the seed paper (Dong, Xue, Zhao): how the normal between the corners is got, its error and its time.
+//! Table 2 of the seed paper (Dong, Xue, Zhao): how the normal between the corners is computed, its error and its time.
 
 use super::hit_errors::HitErrors;
 use super::mesh_source::{FacetTree, MeasuredMesh, MeshSource, answer, with_intersectors};
@@ -17,7 +17,7 @@ const PREPARATION: f64 = 0.1;
 /// Mean error of bilinear normals below which a face is flat: far above rounding (1e-16), far below any curved facet.
 const FLAT: f64 = 1e-9;
 
-/// What is compared and how long.
+/// Settings: what is compared and for how long.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Facets wanted; the paper has 20,000. The tolerance is chosen to come close.

@@ -3,10 +3,10 @@
 use serde::Serialize;
 use std::time::Instant;
 
-/// How far a study has come; handed to its progress callback.
+/// Progress of a study, passed to its progress callback.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Progress {
-    /// What is being done, in a few words.
+    /// Current step, in a few words.
     pub stage: String,
     /// Share of the whole study that is done, 0 to 1.
     pub done: f64,

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 /// A side of a face of a triangulation.
 pub(super) type Side<'c, V> = DirectedEdgeHandle<'c, V, (), CdtEdge<()>, ()>;
 
-/// What a walk took.
+/// Work of a walk.
 pub(super) struct Steps {
     /// Faces that were decided.
     pub(super) asked: usize,

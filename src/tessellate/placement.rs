@@ -10,7 +10,7 @@ use crate::mesh::{Facet, FacetMesh, MeshVertex};
 use crate::model::{Instance, Model, PartId, TessellatedFace};
 use rustc_hash::FxHashMap;
 
-/// What placing gives.
+/// Result of placing.
 pub(super) struct Placed {
     pub(super) made: Tessellation,
     /// Placed faces without facets.

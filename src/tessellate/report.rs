@@ -54,7 +54,7 @@ pub struct Report {
     pub touching_edges: usize,
     /// Placed faces.
     pub faces: FaceCounts,
-    /// Those without facets: nothing could be made of them.
+    /// Faces that could not be meshed and have no facets.
     pub failed: Vec<FailedFace>,
     /// Times.
     pub seconds: Seconds,
@@ -191,7 +191,7 @@ pub struct Seconds {
     pub tessellate: f64,
 }
 
-/// What was given up on a face.
+/// Requirement that was given up on a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -216,7 +216,7 @@ pub struct RepairedFace {
     pub face: u32,
     /// The `#id` in the file.
     pub entity: Option<u64>,
-    /// What was given up.
+    /// The requirement given up.
     pub how: Repair,
     /// The largest distance to its spline: proved for certified facets, sampled for the others or, where that would take too long, for a
     /// share of them, mm. At least the distance to what is left out of a border that crosses itself.

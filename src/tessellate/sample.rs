@@ -10,7 +10,7 @@ use crate::nurbs::Surface;
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
-/// What sampling found on one facet.
+/// Result of sampling one facet.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sampled {
     /// Largest distance found, mm.

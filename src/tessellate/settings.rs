@@ -8,7 +8,7 @@ pub const LEAST_TOLERANCE_MM: f64 = 1e-7;
 /// Tolerance or radius, mm, in place of one that is not positive: less than any machine makes.
 const LEAST_LENGTH: f64 = 1e-9;
 
-/// What the facets must hold to, and how hard to try.
+/// Requirements on the facets, and work limits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Sag allowed at the sharpest and at the flattest places, mm; equal numbers make it uniform.

@@ -8,13 +8,13 @@ use crate::mesh::FacetMesh;
 pub struct Tessellation {
     /// The facets of all placed faces; the id of a facet's face is its index in [`crate::model::Model::placed_faces`].
     pub mesh: FacetMesh,
-    /// What came out, counted.
+    /// Counts of the result.
     pub report: Report,
     /// For each facet of the mesh: what it had to hold to, and whether it does.
     pub quality: Vec<FacetQuality>,
 }
 
-/// How a facet stands to its tolerance.
+/// A facet's quality against its tolerance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FacetQuality {
     /// Tolerance at the facet's place, mm; 0 for faces that are meshes in the file.

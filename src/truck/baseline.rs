@@ -26,7 +26,7 @@ const MODEL: Duration = Duration::from_secs(60);
 /// Name of the threads that truck's mesher runs in: a panic there is a face without triangles and no more.
 pub const THREAD: &str = "truck";
 
-/// What truck's mesher made of a model.
+/// Result of truck's mesher on a model.
 #[derive(Clone, Debug)]
 pub struct Baseline {
     /// Triangles with truck's normals; [`FacetMesh::sag`] is empty.

@@ -115,7 +115,7 @@ pub(super) fn explain_study_option(option: Arg) -> Arg {
         }
         "seed" => "All but `stability`: seed of all random numbers",
         "intersector" => "`effects`: what finds the hits",
-        "normals" => "`effects`: how the normal at a hit is got; exact moves the hit to the spline",
+        "normals" => "`effects`: how the normal at a hit is computed; exact moves the hit to the spline",
         _ => return option,
     };
     option.help(help)

@@ -85,7 +85,7 @@ pub(crate) struct TracingOptions {
     /// What finds the hits; octree by default, in a traced scene chosen by a pilot
     #[arg(long, help_heading = "Rays", value_name = "NAME")]
     pub(crate) intersector: Option<IntersectorKind>,
-    /// How the normal at a hit is got: bilinear by default, in a traced scene chosen by a pilot; exact moves the hit to the spline
+    /// How the normal at a hit is computed: bilinear by default, in a traced scene chosen by a pilot; exact moves the hit to the spline
     #[arg(long, help_heading = "Rays", value_name = "NAME")]
     pub(crate) normals: Option<NormalMode>,
 }

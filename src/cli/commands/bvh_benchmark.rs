@@ -43,7 +43,7 @@ pub(crate) struct BvhBenchmark {
     pub(crate) shapes: Vec<OctreeShape>,
 }
 
-/// What the benchmark was asked for.
+/// Arguments of the benchmark.
 pub(crate) struct BvhCommand<'a> {
     pub(crate) file: Option<&'a Path>,
     /// Rays to trace in place of its own.

@@ -26,7 +26,7 @@ const LAMP_FILE: &str = "../step/lamp_multicavity.stp";
 /// LEDs, media, mirrors and receivers around it.
 const SCENE: &str = include_str!("../../../fixtures/scenes/demo.toml");
 
-/// What both are called in the folder of results.
+/// Names of model and scene in the folder of results.
 const MODEL_NAME: &str = "lamp.stp";
 const SCENE_NAME: &str = "lamp.toml";
 

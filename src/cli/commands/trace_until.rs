@@ -9,7 +9,7 @@ use crate::pipeline::{
 use crate::simulate::PartialRun;
 use std::sync::Mutex;
 
-/// What is to be reached.
+/// The target to reach.
 #[derive(Clone, Copy)]
 pub(super) enum Until<'a> {
     /// An error of a receiver.
@@ -35,11 +35,11 @@ impl Until<'_> {
     }
 }
 
-/// What was traced to find a number of rays.
+/// The run that was traced to find a number of rays.
 pub(super) struct SearchedRun {
     /// The last run.
     pub(super) partial: PartialRun,
-    /// What came of an error that was to be reached.
+    /// Outcome of an error target.
     pub(super) result: Option<TargetResult>,
 }
 

@@ -1,4 +1,4 @@
-//! What a command reads is never replaced by what it writes.
+//! Guards a command's input files against being overwritten by its output.
 
 use super::output_place::folder_of;
 use crate::cli::failure::Failure;

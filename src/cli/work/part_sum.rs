@@ -58,7 +58,7 @@ impl From<Failure> for PartFailure {
     }
 }
 
-/// What made the parts of a sum.
+/// Origins of the parts of a sum.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PartOrigins {
     /// What they took.

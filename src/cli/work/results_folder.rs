@@ -105,7 +105,7 @@ fn remove_earlier(prepared: &PreparedScene, folder: &Path) {
     }
 }
 
-/// What is said of a run beside its figures.
+/// Remarks on a run beside its figures.
 #[derive(Clone, Debug)]
 pub(crate) struct RunRemarks {
     /// Sentences of the report that compare the run with what was asked for or others found, in Markdown.

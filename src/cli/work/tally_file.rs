@@ -67,7 +67,7 @@ pub(crate) struct TallyHeader {
     /// The program that traced it; empty in files of earlier versions.
     #[serde(default)]
     program: String,
-    /// What it took.
+    /// Time and machines that it took.
     #[serde(default)]
     pub(crate) usage: Usage,
 }

@@ -1,16 +1,16 @@
-//! What the parts of a run took, machine by machine.
+//! Times of the parts of a run, machine by machine.
 
 use crate::cli::machine;
 use crate::simulate::{MergedSeconds, Results};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What parts took, by the name of the machine.
+/// Times of parts, by the name of the machine.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub(crate) struct Usage(BTreeMap<String, MachineUsage>);
 
-/// What the parts of one machine took.
+/// Times of the parts of one machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct MachineUsage {
     parts: u32,

@@ -16,7 +16,7 @@ const START_ROOM: f64 = 1e-5;
 /// `RTC_INVALID_GEOMETRY_ID`.
 const NO_GEOMETRY: u32 = u32::MAX;
 
-/// What Embree is given.
+/// The primitives passed to Embree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Primitives {
     /// Two of most facets.

@@ -41,7 +41,7 @@ pub enum EmbreeError {
     },
 }
 
-/// What Embree hands out.
+/// An opaque handle of Embree.
 pub(super) type Handle = *mut c_void;
 
 /// `RTCRayHit` with room behind it: what follows the fields of `RTCHit` depends on how Embree was built.

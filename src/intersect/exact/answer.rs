@@ -20,7 +20,7 @@ pub struct Answer {
     pub near_trim: bool,
 }
 
-/// What a ray crosses all along its way.
+/// All crossings of a ray.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Passage {
     /// The crossings in order of t.

@@ -46,7 +46,7 @@ const PRECISE_ROUNDING: f64 = 1e-27;
 /// Points times degrees of a bicubic net, on which a step takes half a microsecond.
 const BICUBIC_WORK: usize = 96;
 
-/// What has come of a box, of one way to decide it, or of a leaf.
+/// Outcome for a box, for one way to decide it, or for a leaf.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
     /// Nothing is left to do: it is dropped, its roots are offered, or what is left of it is on the stack.
@@ -57,7 +57,7 @@ enum Step {
     AskPrecise,
 }
 
-/// What is clipped.
+/// State of the clipping of a leaf.
 struct Clipping<'a> {
     index: u32,
     leaf: &'a Leaf,

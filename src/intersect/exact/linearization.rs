@@ -30,7 +30,7 @@ pub(super) struct Linearization {
     pub(super) ill_scaled: bool,
 }
 
-/// What names a hit.
+/// The data that identify a hit on a leaf.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct HitLabel {

@@ -80,7 +80,7 @@ pub(super) struct Query {
     /// Two directions across the ray, which complete a frame with `d`.
     pub(super) n1: Vector,
     pub(super) n2: Vector,
-    /// What the hierarchy needs of it.
+    /// The ray as the hierarchy needs it.
     pub(super) slabs: RaySlabs,
     /// The ray's own least t.
     pub(super) t_min: f64,

@@ -31,7 +31,7 @@ pub(super) fn needs_settling(local: [f64; 2], margin: [f64; 2]) -> bool {
     open(local[0], margin[0]) || open(local[1], margin[1])
 }
 
-/// Where a root lies to a leaf.
+/// Position of a root relative to a leaf.
 enum Place {
     OnLeaf,
     /// Beyond, where it is not the root of a neighbour's.

@@ -1,4 +1,4 @@
-//! What the rows of a study hold, whatever is missing in them.
+//! Access to the values in a study's rows, any of which may be missing.
 
 use serde_json::Value;
 

@@ -25,7 +25,7 @@ pub struct RuleFaces {
 #[derive(Clone, Debug)]
 pub struct BoundScene {
     pub(crate) scene: Scene,
-    /// What each placed face is to light.
+    /// Optics of each placed face.
     pub(crate) faces: Vec<FaceOptics>,
     /// The distinct surfaces, which faces name by index.
     pub(crate) surfaces: Vec<Surface>,

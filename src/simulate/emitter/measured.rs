@@ -6,7 +6,7 @@ use crate::optics::IntensitySampler;
 use crate::simulate::scene::{Key, PowerUnit, Scene, Source, SourceKind};
 use crate::simulate::{Error, ErrorKind};
 
-/// What the file of a source holds.
+/// The contents of a source's file.
 #[derive(Clone, Debug)]
 pub(crate) enum Loaded {
     /// A measured intensity, the type of its angles, its flux in the file's unit, and what was supposed of it.

@@ -67,7 +67,7 @@ pub(crate) struct Emitter {
     near_start: Option<NearStart>,
 }
 
-/// What a ray has besides itself as it leaves its source.
+/// Data of a ray, besides its geometry, as it leaves its source.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Emission {
     /// The face it leaves, with the face's outward normal there.

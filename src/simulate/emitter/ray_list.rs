@@ -30,7 +30,7 @@ fn block_rays(rays: u64) -> usize {
 #[derive(Clone, Debug)]
 pub(crate) struct RayList {
     file: Arc<RayFile>,
-    /// What makes power in the unit of the run of that in the file's.
+    /// Converts power from the file's unit to the run's.
     conversion: Conversion,
     /// Spectrum that the file gives for all its rays, in the unit of the run; no ray has a wavelength of its own then.
     pub(crate) spectrum: Option<Wavelengths>,

@@ -1,4 +1,4 @@
-//! What all replicates of a run share.
+//! Data that all replicates of a run share.
 
 use super::payload::RayPayload;
 use super::receiver_index::ReceiverIndex;
@@ -29,7 +29,7 @@ pub(super) enum StartingMedia {
     InSolid,
 }
 
-/// What all replicates share.
+/// Data that all replicates share.
 #[derive(Clone)]
 pub(crate) struct Context<'a> {
     pub(crate) bound: &'a BoundScene,

@@ -31,7 +31,7 @@ pub(super) struct SurfaceInteraction<'a> {
     pub(super) refused_contact: bool,
 }
 
-/// What a face does to light.
+/// Interaction of light with a face.
 pub(super) enum Interaction<'s, C> {
     /// It ends here.
     Absorb,

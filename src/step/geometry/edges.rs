@@ -35,7 +35,7 @@ pub(crate) struct TrimmedEdge {
     pub(crate) curve: Option<Curve>,
     /// Distance between the curve's ends and the vertices, mm.
     pub(crate) gap: f64,
-    /// What had to be put right.
+    /// Repairs that were necessary.
     pub(crate) repair: Option<&'static str>,
     /// Whether it is part of a closed curve, of which the same vertices bound another part.
     pub(crate) is_arc: bool,

@@ -42,7 +42,7 @@ pub(crate) struct Refusal {
     pub(crate) reason: String,
 }
 
-/// What was read, or why not.
+/// The entity as read, or why it was refused.
 pub(crate) type Outcome<T> = Result<T, Refusal>;
 
 impl Refusal {

@@ -5,7 +5,7 @@ use super::Fault;
 /// Faults that are kept with their lines; the rest is counted.
 const MAX_FAULTS: usize = 100;
 
-/// What was noted of a source so far.
+/// Faults found in a source so far.
 pub(super) struct Faults<'a> {
     source: &'a [u8],
     /// The first ones.

@@ -66,7 +66,7 @@ pub(super) struct Fault {
     pub(super) line: usize,
     /// The `#id` of its instance, when it had come that far.
     pub(super) id: Option<u64>,
-    /// What was wrong.
+    /// The fault.
     pub(super) what: &'static str,
 }
 

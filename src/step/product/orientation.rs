@@ -180,7 +180,7 @@ fn domain_center(face: &Face) -> Uv {
     Uv::new(0.5 * (u0 + u1), 0.5 * (v0 + v1))
 }
 
-/// What flows out of a face, or of several.
+/// Flux out of a face, or of several.
 #[derive(Clone, Copy, Debug, Default)]
 struct Flow {
     /// A third of the flow of `p - center`, mm³: by Gauss's theorem, out of a closed surface, its volume.

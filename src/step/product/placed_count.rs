@@ -1,4 +1,4 @@
-//! How much an assembly would place, counted without placing it.
+//! Counts what an assembly would place, without placing it.
 //!
 //! Known weakness: products that contain each other are counted as if the cycle were cut where it is met first; the walk has a limit of
 //! its own for these.

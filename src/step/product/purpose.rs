@@ -1,4 +1,4 @@
-//! What representations are for.
+//! Purposes of representations.
 
 use crate::step::part21::File;
 

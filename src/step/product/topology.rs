@@ -76,7 +76,7 @@ pub(crate) struct FacePlan {
     pub(crate) loops: Vec<Vec<(EdgeKey, bool)>>,
 }
 
-/// What the items of a representation amount to.
+/// The shapes in the items of a representation.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ShapeItems {
     pub(crate) shells: Vec<ShellPlan>,

@@ -8,7 +8,7 @@ use crate::step::part21::File;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
-/// What a common translator calls every usage.
+/// Name that a common translator gives every usage.
 const DEFAULT_NAME: &str = "Next assembly relationship";
 
 /// A child of a product: its definition, what its place is called, the `#id` of the usage, and where it stands.
@@ -30,7 +30,7 @@ pub(super) enum UsagePlacement {
     Stated(Frame),
 }
 
-/// What a placed representation is called, and what it is placed by.
+/// Name of a placed representation, and what places it.
 #[derive(Clone, Copy)]
 pub(super) struct Occurrence<'o> {
     /// Name of the usage, empty when it had none.

@@ -25,7 +25,7 @@ pub(crate) struct Boundary {
     pub(crate) loops: Vec<Chain>,
     /// Straight seams in the parameter plane, by their number in [`Source::Seam`].
     pub(crate) seams: Vec<[Uv; 2]>,
-    /// What had to be put right.
+    /// Repairs that were necessary.
     pub(crate) repairs: Vec<&'static str>,
 }
 

@@ -16,7 +16,7 @@ use serde::Serialize;
 /// Direction errors below this are rounding, degrees: 8e6 units in the last place of a radian.
 const ROUNDING_DEG: f64 = 1e-7;
 
-/// What is swept and how long.
+/// Settings: what is swept and for how long.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Tolerances `[min, max]`, mm, coarse first.

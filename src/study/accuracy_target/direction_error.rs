@@ -1,4 +1,4 @@
-//! How far off its true direction light leaves a facet.
+//! Error of the direction in which light leaves a facet.
 
 use crate::intersect::Hit;
 use crate::math::{FaceId, Vector};

@@ -170,7 +170,7 @@ struct Candidate {
     work: f64,
 }
 
-/// What some rays showed on the facets of a plan.
+/// Results of some rays on the facets of a plan.
 struct Measured<E> {
     /// The face of each facet.
     made: Vec<FaceId>,
@@ -179,7 +179,7 @@ struct Measured<E> {
     errors: E,
 }
 
-/// What all candidates are judged with.
+/// Data with which all candidates are judged.
 struct Search<'a> {
     mesh_source: &'a dyn MeshSource,
     target: &'a AccuracyTarget,

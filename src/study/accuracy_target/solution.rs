@@ -45,7 +45,7 @@ impl JobWork {
     }
 }
 
-/// What a kind of normals came to.
+/// Outcome for a kind of normals.
 pub(super) struct Solution {
     pub(super) normals: NormalMode,
     pub(super) plan: TolerancePlan,

@@ -55,7 +55,7 @@ impl ReferenceRays {
     }
 }
 
-/// How far off facets send some rays.
+/// Direction errors of some rays on facets.
 #[derive(Default)]
 pub(super) struct DirectionErrors {
     /// Of hits on curved faces, degrees, with the face that the spline's hit is on.

@@ -66,7 +66,7 @@ pub struct Intersectors<'a> {
     pub exact: &'a dyn Intersector,
 }
 
-/// How the cross-check works.
+/// Settings of the cross-check.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Sag assumed for facets without a proved one, mm: the tolerance requested of the mesher.

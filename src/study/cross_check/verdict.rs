@@ -30,7 +30,7 @@ pub enum Cause {
     Unexplained(Defect),
 }
 
-/// What is wrong where no cause explains a difference.
+/// The defect where no cause explains a difference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]

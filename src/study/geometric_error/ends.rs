@@ -1,4 +1,4 @@
-//! What facets change of where the light ended.
+//! Changes by facets of the powers by where the light ended.
 
 use super::paired::{Paired, PairedSums};
 use super::replicates::ReplicatedRun;

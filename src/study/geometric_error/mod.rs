@@ -29,7 +29,7 @@ use crate::intersect::Intersector;
 use crate::simulate::{BoundScene, RunSettings};
 use serde::Serialize;
 
-/// What facets change of a run.
+/// Changes of a run's figures by facets.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct GeometricError {
     /// Rays from the sources, traced on both.
@@ -52,7 +52,7 @@ pub struct GeometricError {
     pub faces: Vec<FaceError>,
 }
 
-/// What facets change of one receiver's light.
+/// Changes of one receiver's light by facets.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ReceiverError {
     /// Name of the receiver.
@@ -86,7 +86,7 @@ pub struct ReceiverError {
     pub channels: Vec<ChannelError>,
 }
 
-/// What facets change of a further channel of a receiver.
+/// Changes of a further channel of a receiver by facets.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ChannelError {
     /// Name of the channel.

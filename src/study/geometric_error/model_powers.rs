@@ -1,4 +1,4 @@
-//! What facets change of the powers that bodies and media took.
+//! Changes by facets of the powers that bodies and media absorbed.
 
 use super::cells::{Cell, paired_cells};
 use super::paired::Paired;

@@ -19,7 +19,7 @@ const TRIM_BAND: f64 = 2e-6;
 /// |cos| of the incidence below which the band is taken as no longer.
 const GRAZING: f64 = 1e-3;
 
-/// What an answer is worth.
+/// Grade of an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grade {
     /// Agrees with the truth.

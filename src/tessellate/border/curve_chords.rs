@@ -60,7 +60,7 @@ pub(in crate::tessellate) fn breaks(curve: &Curve) -> Vec<f64> {
     (0..n).filter(|&i| i == 0 || i + 1 == n || is_kink(i)).map(|i| b[i]).collect()
 }
 
-/// What dividing a curve may cost.
+/// Work limit for dividing a curve.
 #[derive(Clone, Copy)]
 pub(super) struct Effort {
     /// In how many steps a piece is sampled before it is divided.

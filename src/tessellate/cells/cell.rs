@@ -44,7 +44,7 @@ pub(in crate::tessellate) struct ProvedCell {
     pub(in crate::tessellate) places: [Point; 4],
 }
 
-/// What the tree leaves of a face.
+/// Cells of a face after division by the tree.
 #[derive(Default)]
 pub(in crate::tessellate) struct Subdivision {
     /// Wholly inside, not cut by the border, and proved.

@@ -37,7 +37,7 @@ pub(in crate::tessellate) struct Grid {
     pub(in crate::tessellate) outline: Vec<[u32; 2]>,
 }
 
-/// What cells are made on.
+/// Nodes and surface from which cells are made.
 pub(in crate::tessellate) struct GridInput<'g> {
     /// Those of the border at first; corners of cells are added.
     pub(in crate::tessellate) nodes: &'g mut Nodes,

@@ -14,7 +14,7 @@ const THINNEST: f64 = 0.05;
 /// Share of the rectangle by which a part may miss the region and still be taken to meet it: rounding.
 const TOUCHING: f64 = 1e-12;
 
-/// What is measured of the deviation from L.
+/// The measured part of the deviation from L.
 enum Measure {
     /// All of it.
     Whole,

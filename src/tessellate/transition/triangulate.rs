@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use spade::Triangulation;
 
-/// What is to be triangulated.
+/// Input of the triangulation.
 pub(in crate::tessellate) struct Outline<'t> {
     pub(in crate::tessellate) nodes: Nodes,
     /// Constraint segments, each turning outside into inside.

@@ -1,4 +1,4 @@
-//! What the audit finds.
+//! A hit of the audit.
 
 use crate::math::{FaceId, Uv};
 

@@ -55,7 +55,7 @@ struct TrimPiece {
     points: Vec<DVec3>,
 }
 
-/// What clipping found along a ray.
+/// The crossings that clipping found along a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AuditAnswer {
     /// The first crossing in `[t_min, t_max]`.
