@@ -2,7 +2,7 @@
 //!
 //! Data goes to stdout, messages and progress to stderr. Progress appears on a terminal alone, `NO_COLOR` is respected, and
 //! `--json` prints exactly one document. A reader of stdout that goes away is no failure: files are written all the same. Names out of
-//! files are data: what a terminal would obey in them is written out. Known weakness: on Windows no signal saves a run.
+//! files are data: control sequences in them are escaped. Known weakness: on Windows no signal saves a run.
 //!
 //! The order of the modules, each of which uses only those before it, is in `tests/architecture/layers.rs`.
 

@@ -96,7 +96,7 @@ impl Frame {
         Vector::new(self.x.dot(v), self.y.dot(v), self.z.dot(v))
     }
 
-    /// Joins two placements, `self ∘ inner`: what comes of placing by `inner` first, then by `self`.
+    /// Joins two placements, `self ∘ inner`: the placement by `inner` first, then by `self`.
     pub fn compose(&self, inner: &Self) -> Self {
         Self {
             origin: self.point(inner.origin),

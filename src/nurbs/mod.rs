@@ -2,7 +2,7 @@
 //!
 //! Plane, cylinder, cone, sphere, torus, revolution and extrusion are exact as rational B-splines and are built
 //! here ([`conic`], [`sweep`]). Control points are homogeneous, `(w·x, w·y, w·z, w)`. The domain is
-//! `[knots[degree], knots[n]]`. Splines are clamped but while they are read; inner knots stand up to `degree` times.
+//! `[knots[degree], knots[n]]`. Splines are clamped except while they are read; inner knots stand up to `degree` times.
 //!
 //! Source of the algorithms: Piegl and Tiller, *The NURBS Book*, 2nd ed.; blossoming after Ramshaw 1989.
 //! Known weakness: Cox–de Boor evaluation costs about 0.15 µs a bicubic point, so ray loops and meshers extract

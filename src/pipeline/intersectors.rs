@@ -53,7 +53,7 @@ impl IntersectorChoice {
 /// When such normals are asked for, and when the scene names an intersector or normals that are not known.
 pub fn refuse_facet_normals(tracing: &TracingSettings, scene: Option<&Scene>) -> Result<(), Error> {
     let IntersectorChoice { intersector, normals } = IntersectorChoice::new(tracing, scene)?;
-    // Settings that stand above the scene may leave its normals without meaning.
+    // Settings that override the scene may make its normals meaningless.
     let is_asked = tracing.normals.is_some()
         || tracing.intersector.is_none() && scene.is_some_and(|scene| scene.accuracy.normals.is_some());
     if intersector != IntersectorKind::Exact || !is_asked || normals == NormalMode::Exact {

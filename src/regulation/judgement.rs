@@ -63,7 +63,7 @@ pub(super) struct Decisive {
     /// With errors of which [`SIGMAS`] reach as far as the reading may be off: those of the luckiest, where it was chosen from many.
     pub(super) reading: Reading,
     pub(super) direction: [f64; 2],
-    /// How far the reading is on the good side of its limit, cd.
+    /// Margin of the reading on the passing side of its limit, cd.
     margin: f64,
     /// Standard errors of the reading by itself that the margin must have.
     sigmas: f64,
@@ -123,7 +123,7 @@ impl Decisive {
 }
 
 impl Judgement {
-    /// Returns how far the reading that decides is on the good side of its limit, over what makes it sure; least of all where none was
+    /// Returns how far the reading that decides is on the passing side of its limit, over what makes it sure; least of all where none was
     /// read.
     fn surety(&self) -> f64 {
         self.decisive.map_or(f64::NEG_INFINITY, |decisive| decisive.surety)

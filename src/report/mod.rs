@@ -5,7 +5,7 @@
 //! it, and a CSV of every table under `tables/`. In `report.html` every chart carries its static twin, so that it shows without
 //! scripts or WebGL.
 //!
-//! Guarantee: `report.html` stays under 15 MB; what is simplified for showing says so in its caption. Known weakness: the 3-D views need
+//! Guarantee: `report.html` stays under 15 MB; the caption of a simplified picture says so. Known weakness: the 3-D views need
 //! WebGL to turn; without it their static picture remains.
 
 mod canvas;

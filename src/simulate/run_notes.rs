@@ -48,7 +48,7 @@ impl BoundScene {
         })
     }
 
-    /// Returns sentences about places where the kernel made do with less than the scene asks for, each where it was more frequent than once
+    /// Returns sentences about places where the kernel did less than the scene requests, each where it was more frequent than once
     /// in [`OVERLAP_SEGMENTS`] segments or rays.
     pub(crate) fn repair_notes(&self, counts: &Counts) -> impl Iterator<Item = String> + use<> {
         let contacts = (counts.refused_contacts > counts.segments / OVERLAP_SEGMENTS).then(|| {

@@ -330,7 +330,7 @@ impl Reader<'_, '_, '_> {
         let ConvertedPart { mut part, found, refused, repaired } = converted;
         part.name = if placed.product.is_empty() { placed.name.clone() } else { placed.product.clone() };
         part.colour = self.styles.colour(placed.representation);
-        // The colour of an occurrence stands above the part's alone: where some have one, that of all its shells is the part's.
+        // The colour of an occurrence overrides only the part's: where some have one, that of all its shells is the part's.
         let mut owners =
             items.shells.iter().flat_map(|plan| &plan.owners).chain(ids).chain([&placed.representation]);
         let of_first = part.shells.first().and_then(|shell| shell.colour);

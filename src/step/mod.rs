@@ -7,9 +7,9 @@
 //! (`product`). Of `part21`, `chart`, `geometry`, `trim` and `product` each sees only those before it.
 //!
 //! Guarantee: what [`crate::model`] promises, with uv curves within [`Settings::uv_tolerance`] of the foot points of
-//! their edges wherever they were checked; each face is converted, repaired (said how) or refused (said why). Known
+//! their edges wherever they were checked; each face is converted, repaired (with how) or refused (with why). Known
 //! weakness: curves that the file gives in a parameter plane are used only where the one in space is missing, other
-//! edges are always located anew; mirrored placements are taken as they are.
+//! edges are always located anew; mirrored placements are kept as they are.
 //!
 //! ```no_run
 //! use lampyris::step::{Settings, read};

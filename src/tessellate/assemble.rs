@@ -45,7 +45,7 @@ const MAX_ROUNDS: u32 = 3;
 const MAX_ROUNDS_OF_REPAIRED: u32 = 4;
 /// The same with the rounds in which edges whose chords cross take each other's corners: a few near a cusp, each nearer to it.
 const MAX_ROUNDS_OF_CROSSING: u32 = MAX_ROUNDS_OF_REPAIRED + 4;
-/// Samples of an edge up to which its chords may be why its face comes to nothing.
+/// Samples of an edge up to which its chords may be the reason that its face has no facets.
 const FEW_CHORDS: usize = 500;
 
 /// Meshes every part once, for the largest scale at which it is placed. `None` for a part without an instance; faces that fail are `None`

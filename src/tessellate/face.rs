@@ -222,7 +222,7 @@ fn outline<'t>(
     (nodes, segments, imprinted): (Nodes, Vec<[u32; 2]>, Vec<[u32; 2]>),
 ) -> Outline<'t> {
     let FaceInput { surface, taken, untangles, .. } = *input;
-    // Without a transition its scale is of no interest, and it costs curvatures.
+    // Without a transition its scale is not needed, and it costs curvatures.
     let scale = if segments.is_empty() { Uv::ONE } else { parameter_scale(surface, polygons, cells) };
     let creases = crease_lines(surface, &nodes, &segments);
     let outline = Outline { nodes, segments, creases, imprinted, chords, scale, taken };

@@ -1,4 +1,4 @@
-//! What rounds of meshing a part keep of the one before: faces of which no edge has changed, with the numbers of their corners put right.
+//! What rounds of meshing a part reuse of the one before: faces none of whose edges has changed, with their corners renumbered.
 
 use super::border::edges::Division;
 use super::face_mesh::FaceMesh;

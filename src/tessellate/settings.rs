@@ -51,7 +51,7 @@ pub struct Settings {
 /// Another tolerance for some faces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ToleranceOverride {
-    /// The faces that it is for.
+    /// The faces to which it applies.
     pub scope: ToleranceScope,
     /// As [`Settings::tolerance`].
     pub tolerance: [f64; 2],

@@ -1,4 +1,4 @@
-//! Text for people: numbers with as many digits as mean something, the name that was probably meant, lists in order.
+//! Text for people: numbers with their significant digits, suggestions for misspelled names, ordered lists.
 
 #[cfg(feature = "cli")]
 mod natural_order;

@@ -1,4 +1,4 @@
-//! The only door to the truck kernel: its shapes become a [`crate::model::Model`], our faces become its faces, and its mesher is
+//! The only interface to the truck kernel: its shapes become a [`crate::model::Model`], our faces become its faces, and its mesher is
 //! the baseline ours is measured against.
 //!
 //! Planes, B-splines, rational B-splines and surfaces of revolution come in exactly; edges get uv curves (exact on planes, cubic

@@ -1,4 +1,4 @@
-//! What a run that goes on with `--resume` says of the commands that it is owed to.
+//! What a run continued with `--resume` says of the commands that traced it.
 
 use crate::runs::{document, lens};
 use crate::support::lampyris_in;

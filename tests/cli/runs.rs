@@ -208,7 +208,7 @@ fn shards_merge_to_the_bits_of_one_run() {
     }
 }
 
-/// A file holds one shard: another is refused there, to be gone on with or not, and what the file holds stays.
+/// A file holds one shard: another is refused there, to be continued or not, and the file keeps its contents.
 #[test]
 fn a_shard_does_not_go_into_the_file_of_another() {
     let folder = lens(|m| m);
@@ -258,7 +258,7 @@ fn a_killed_run_resumes_to_the_same_bits() {
     assert!(!saved.exists());
 }
 
-/// A search for a number of rays that is killed goes on with the run that it was at, to the bits of one that was not.
+/// A search for a number of rays that is killed continues the run that it was at, to the same bits as one that was not.
 #[test]
 fn a_killed_search_resumes_to_the_same_bits() {
     let folder = lens(|m| m);

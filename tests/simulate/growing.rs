@@ -53,7 +53,7 @@ fn further_rays_give_the_bits_of_one_run() {
     for (a, b) in a.receivers.iter().zip(&b.receivers) {
         assert_eq!((a.power, a.power_error, &a.cells, &a.errors), (b.power, b.power_error, &b.cells, &b.errors));
     }
-    // What was done is gone on with.
+    // What was done is continued.
     let grown = part([0, 60_000], [0, 1], Some(part([0, 25_000], [0, 1], None)));
     assert_eq!(grown.tallies, whole.tallies);
 }
@@ -77,7 +77,7 @@ fn there_may_be_more_shards_than_replicates() {
     assert_eq!(sum.tallies, part([0, 10_000], [0, 1], None).tallies);
 }
 
-/// A shard of which a part was done on another machine is gone on with here, and has nothing of that part.
+/// A shard of which a part was done on another machine is continued here, and has nothing of that part.
 #[test]
 fn what_is_done_elsewhere_is_left_out() {
     let (_, bound) = ball();

@@ -1,4 +1,4 @@
-//! Where the kernel makes do with less than a scene asks for: it is counted and reported.
+//! Where the kernel does less than a scene requests: it is counted and reported.
 
 use crate::support::{Shape, World};
 use lampyris::math::{Frame, Point};

@@ -202,7 +202,7 @@ fn report_defects(found: &CrossCheck, console: &Console) -> Completion {
     completion
 }
 
-/// Returns what `--json` prints. `receivers` are those of a scene, `None` without one; `reached` is what came of `--accuracy`.
+/// Returns what `--json` prints. `receivers` are those of a scene, `None` without one; `reached` is the outcome of `--accuracy`.
 fn json_document(
     found: &CrossCheck,
     normals: NormalMode,

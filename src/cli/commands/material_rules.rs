@@ -239,7 +239,7 @@ mod tests {
         );
     }
 
-    /// Forty-eight LEDs take no line of forty-eight numbers: their rule is that of the part, and stands above the board's, which wins.
+    /// Forty-eight LEDs take no line of forty-eight numbers: their rule is that of the part, and comes before the board's, which wins.
     #[test]
     fn many_solids_alike_are_what_is_said_of_their_part() {
         let mut ring = part("ring", 1, 49, 1.0);

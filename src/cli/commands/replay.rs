@@ -24,7 +24,7 @@ pub(crate) struct ReplayRequest {
     run: Option<LedgerRun>,
 }
 
-/// What decides which ray of a run bears which number.
+/// The values that determine the numbering of a run's rays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct LedgerRun {
     seed: u64,

@@ -31,7 +31,7 @@ use std::path::Path;
 /// Room that the sums of a shard need at least, bytes.
 const LEAST_TALLY_BYTES: u64 = 100_000;
 
-/// What goes on with a run that was saved, and with one whose paths were to be written.
+/// Commands that continue a saved run, and one whose paths were to be written.
 const RESUME: &str = "the same command with --resume";
 const RESUME_WITHOUT_PATHS: &str =
     "the same command with --resume in place of --paths, which are those of a whole run,";
@@ -329,7 +329,7 @@ fn say_verification(run: &SceneResults, console: &Console) -> Result<(), Failure
     Ok(())
 }
 
-/// Traces a shard (index from 0, count), or goes on with it, into its file; one that is done already is not traced again. Incomplete where
+/// Traces a shard (index from 0, count), or continues it, into its file; one that is done already is not traced again. Incomplete where
 /// light was lost beyond the limit. Fails when interrupted, with what was done saved.
 fn trace_shard(
     prepared: &PreparedScene,

@@ -43,7 +43,7 @@ pub(super) struct SearchedRun {
     pub(super) result: Option<TargetResult>,
 }
 
-/// Saves the runs of a search, and goes on with the one that an earlier process was at.
+/// Saves the runs of a search, and continues the one that an earlier process was at.
 struct SavedRuns<'a> {
     place: &'a SavePlace<'a>,
     /// What is done of the first run; taken by it.

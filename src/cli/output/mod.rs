@@ -1,4 +1,4 @@
-//! How answers are shown on the terminal and written to files.
+//! Results on the terminal and in files.
 
 pub(super) mod appearance;
 pub(super) mod closing;

@@ -18,7 +18,7 @@ const BYTES_IN_GB: f64 = 1e9;
 /// # Errors
 /// When its limit is no number.
 pub(crate) fn cache(option: &CacheOption) -> Result<Option<Cache>, Failure> {
-    // The option stands above the environment.
+    // The option overrides the environment.
     let Some(folder) = option.cache.clone().or_else(|| environment_variable(FOLDER_VARIABLE).map(PathBuf::from))
     else {
         return Ok(None);

@@ -36,7 +36,7 @@ pub(crate) struct SavePlace<'a> {
     search: Option<String>,
     /// Least time between two saves.
     every: Duration,
-    /// The head of what an earlier process left, where this one goes on with it.
+    /// The header of an earlier process's file, where this one continues it.
     earlier: Mutex<Option<TallyHeader>>,
     pub(crate) console: &'a Console,
 }
@@ -107,7 +107,7 @@ impl<'a> Checkpoint<'a> {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             Err(e) => return Err(Failure::input(format!("{}: {e}", file.display()))),
         };
-        // Of the scene as it is now: what changed since cannot be gone on with.
+        // Of the scene as it is now: a run of a changed scene cannot be continued.
         let expected = self.prepared.fingerprint()?.0;
         let same = |h: &TallyHeader| {
             if h.fingerprint == expected {

@@ -14,7 +14,7 @@ pub(crate) struct RunCommands {
     /// What that one searches for with runs of growing length; `None` where it asks for a single run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     search: Option<String>,
-    /// Those that traced the parts of a sum, or of a run that goes on with one; empty where `command` says all.
+    /// Those that traced the parts of a sum, or of a run that continues one; empty where `command` says all.
     #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
     traced_by: BTreeSet<String>,
 }
@@ -73,7 +73,7 @@ mod tests {
         RunCommands { command: command.into(), search: search.map(str::to_owned), traced_by }
     }
 
-    /// However often a run is gone on with, it is that of the command that began it; parts are named with what traced the rest.
+    /// However often a run is continued, it is that of the command that began it; parts are named with what traced the rest.
     #[test]
     fn a_run_that_goes_on_is_that_of_its_first_command() {
         let begun = commands("first", None, &[]);
@@ -93,7 +93,7 @@ mod tests {
             assert_eq!(own().search_on_from(&other), own());
         }
         assert_eq!(own().search_on_from(&commands("merge", None, &["a", "b"])), own());
-        // A search that goes on with the run of another command did not begin it, and that command does not explain its result.
+        // A search that continues the run of another command did not begin it, and that command does not explain its result.
         let resumed = own().continue_from(&commands("plain", None, &[]));
         assert_eq!(commands("again", Some("1%"), &[]).search_on_from(&resumed), commands("again", Some("1%"), &[]));
     }

@@ -73,8 +73,8 @@ pub(crate) struct TallyHeader {
 }
 
 impl TallyHeader {
-    /// Returns the header of a run of the scene file `scene`, or of a shard (index from 0, count) of it, that is about to be traced and is
-    /// owed to `commands`. No usage yet.
+    /// Returns the header of a run of the scene file `scene`, or of a shard (index from 0, count) of it, that is about to be traced by
+    /// `commands`. No usage yet.
     pub(crate) fn new(
         prepared: &PreparedScene,
         scene: &Path,

@@ -123,7 +123,7 @@ mod tests {
         }
         let total = MergedSeconds { parts: 3, machines: 2, cpu: Some(8.0), slowest: 5.0, threads: Some(4) };
         assert_eq!(sum.total(), Some(total));
-        // One part that was stopped and gone on with, on the same machine and on another.
+        // One part that was stopped and continued, on the same machine and on another.
         let resumed = part("a", 3.0, 2.0).continue_from(&part("a", 1.0, 4.0));
         let total = MergedSeconds { parts: 1, machines: 1, cpu: Some(4.0), slowest: 6.0, threads: Some(3) };
         assert_eq!(resumed.total(), Some(total));

@@ -15,7 +15,7 @@ pub(super) struct FaceRules {
     pub(super) medium: Option<usize>,
 }
 
-/// Finds for each placed face the rules that give its surface and its medium; later rules stand above earlier ones. A medium given to a
+/// Finds for each placed face the rules that give its surface and its medium; later rules override earlier ones. A medium given to a
 /// part of a solid's faces goes to all of them.
 ///
 /// # Errors
@@ -27,7 +27,7 @@ pub(super) fn find_rules(scene: &Scene, model: &Model) -> Result<Vec<FaceRules>,
         let base = [Key::Name("material"), Key::Index(i), Key::Name("on")];
         let base = if rule.on.is_some() { &base[..] } else { &base[..2] };
         for face in select_faces(scene, base, &rule.faces(), &mut search)? {
-            // A later rule stands above an earlier one, for surfaces and media apart.
+            // A later rule overrides an earlier one, separately for surfaces and media.
             if rule.surface.is_some() || rule.scatter.is_some() {
                 rules[face].surface = Some(i);
             }

@@ -1,4 +1,4 @@
-//! Sources in the form that makes rays.
+//! Sources in the form from which rays are sampled.
 //!
 //! The order of the modules, each of which uses only those before it, is in `tests/architecture/layers.rs`.
 

@@ -1,4 +1,4 @@
-//! What happens to light at a face, in words that the tracer books.
+//! What happens to light at a face, as values that the tracer tallies.
 
 use super::contact::FaceHit;
 use super::context::Context;

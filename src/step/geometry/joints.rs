@@ -355,7 +355,7 @@ mod tests {
         assert!(are_crossed(&joined, [8.5, 9.7]));
     }
 
-    /// Joins two straight segments that overlap, and compares what comes of them with a path.
+    /// Joins two straight segments that overlap, and compares the result with a path.
     fn assert_joined(segments: [[[f64; 2]; 2]; 2], path: &[[f64; 2]]) {
         let segments = segments.into_iter().map(|[from, to]| line(from, to, [0.0, 1.0])).collect();
         let joined = join_segments(1, segments, 1e-6, 0.1).expect("two segments");

@@ -39,7 +39,7 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
         is_ended: false,
     };
     let marked = p.statements();
-    // A lost first line is forgiven to a file that goes on with instances.
+    // A missing first line is accepted in a file that continues with instances.
     if !marked && p.instances.is_empty() {
         return Err(Error::new(ErrorKind::NotStep { file: name.into() }));
     }

@@ -1,4 +1,4 @@
-//! Loops whose uses do not follow each other: wrong orientation flags and shuffled lists, put right by their ends.
+//! Loops whose uses do not follow each other: wrong orientation flags and shuffled lists, corrected by their ends.
 
 use crate::math::Point;
 use rustc_hash::FxHashMap;

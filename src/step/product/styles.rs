@@ -69,7 +69,7 @@ impl Styles {
                 break;
             }
         }
-        // Last, because an overriding style stands above the plain one wherever the file has it.
+        // Last, because an overriding style wins over the plain one wherever the file has it.
         plain.extend(over);
         let mut styles = Self { colours: plain, layers, overridden, occurrences: FxHashMap::default() };
         styles.add_paths(file, &usages);

@@ -27,7 +27,7 @@ impl FaceTask<'_> {
             for k in 0..uses.len() {
                 is_torn |= self.keep_to_sheet(uses, k, fits)?;
             }
-            // An edge that lies on another sheet from end to end is put right from a neighbour, which may have been wrong itself.
+            // An edge that lies on another sheet from end to end is corrected from a neighbour, which may have been wrong itself.
             for k in (0..uses.len()).filter(|_| is_torn) {
                 self.keep_to_sheet(uses, k, fits)?;
             }

@@ -30,7 +30,7 @@ pub enum Grade {
     Wrong,
 }
 
-/// Roundings of the ray and of the model that a truth's margin must exceed to be held against an intersector.
+/// Roundings of the ray and of the model that a truth's margin must exceed to count against an intersector.
 const ROUNDINGS: f64 = 8.0;
 
 /// One line of the table.

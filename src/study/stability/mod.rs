@@ -7,7 +7,7 @@
 //!
 //! Guarantee: truths come from how the rays were built or from the surface's equation, never from an intersector.
 //! Facets are right when their hit lies within their sag of the true surface and no full crossing of that band was missed.
-//! Known weakness: where the truth itself hangs on the last bits of the input ([`Scene::resolution`]) any answer near it
+//! Known weakness: where the truth itself depends on the last bits of the input ([`Scene::resolution`]) any answer near it
 //! is accepted.
 
 mod case;
