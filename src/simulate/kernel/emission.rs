@@ -225,7 +225,7 @@ impl SourceQueue {
 }
 
 impl<C: RayPayload> Tracer<'_, '_, C> {
-    /// Puts a ray that leaves its source on its way: finds its face and media, tallies it as emitted and clips its first segment. `false`
+    /// Puts a ray that leaves its source on its way: finds its face and media, books it as emitted and clips its first segment. `false`
     /// when it is in more bodies than it can carry, or could not be read; it is then booked as lost.
     #[inline(always)]
     fn start_path(&mut self, source: usize, emission: &Emission, path: &mut Path<C>, ray: &mut Ray) -> bool {

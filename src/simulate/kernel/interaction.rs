@@ -1,4 +1,4 @@
-//! What happens to light at a face, as values that the tracer tallies.
+//! What happens to light at a face, as values that the tracer books.
 
 use super::contact::FaceHit;
 use super::context::Context;

@@ -3,7 +3,7 @@
 //! A replicate is traced in batches that are topped up with new rays as paths end, so that the intersector always has many
 //! rays to interleave. What a ray carries is a type parameter ([`payload::RayPayload`]): a scene without media does not pay for
 //! them. Everything else is arithmetic behind the `match`. A surface returns what becomes of light ([`interaction::Interaction`]); the
-//! tracer tallies it.
+//! tracer books it.
 //!
 //! The order of the modules, each of which uses only those before it, is in `tests/architecture/layers.rs`.
 
