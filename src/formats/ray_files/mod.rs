@@ -62,7 +62,9 @@ impl RayFile {
             b"TM25" if binary => Tm25Reader::open(path)?.into_ray_file(preferred, most_in_memory),
             b"LTRF" if binary => lighttools::read(path, most_in_memory),
             // The identifier of the other binary format is a number, not letters.
-            start if binary && i32::from_le_bytes(*start) == zemax::IDENTIFIER => zemax::read(path, most_in_memory),
+            start if binary && zemax::IDENTIFIERS.contains(&i32::from_le_bytes(*start)) => {
+                zemax::read(path, most_in_memory)
+            }
             start => {
                 let mut head = start.to_vec();
                 file.take(TEXT_HEAD).read_to_end(&mut head).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;

@@ -6,8 +6,8 @@ use super::ray_file::{Flux, RayFile, RowLayout, RowWavelength};
 use crate::formats::Error;
 use std::path::Path;
 
-/// The version of the format that is in use, the first number of a file.
-pub(super) const IDENTIFIER: i32 = 1010;
+/// The first number of a file: the version of the format, or the number that files have in its place that other programs write.
+pub(super) const IDENTIFIERS: [i32; 2] = [1010, 8_675_309];
 
 /// Length of a unit in mm, by `DimensionUnits`.
 const UNITS_MM: [f64; 5] = [1000.0, 25.4, 10.0, 304.8, 1.0];
@@ -137,6 +137,13 @@ pub(super) mod tests {
         assert_eq!((set.rays[0].origin.x, set.rays[0].power, set.flux), (1.0, 2.0, Some(Flux::Luminous)));
         assert!((set.rays[0].wavelength_nm.unwrap() - 633.0).abs() < 1e-4);
         assert_eq!(set.notes.len(), 1);
+
+        // The other identifier, with the same layout.
+        let mut bytes = file(4, 0, 1, 2.0, &[1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 4.0]);
+        bytes[..4].copy_from_slice(&8_675_309i32.to_le_bytes());
+        std::fs::write(&path, bytes).unwrap();
+        let set = read_ray_set(&path, Flux::Luminous).unwrap();
+        assert_eq!((set.rays[0].origin.x, set.rays[0].power, set.flux), (1.0, 2.0, Some(Flux::Luminous)));
 
         // One ray of two is counted.
         let two = [[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]; 2].concat();
