@@ -5,7 +5,7 @@ use super::face_mesh::FaceMesh;
 use super::nodes::Position;
 use super::repairs::PlacedRepair;
 use super::tessellation::{FacetQuality, Tessellation};
-use crate::math::{FaceId, Frame};
+use crate::math::{FaceId, Frame, huge_pages};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
 use crate::model::{Instance, Model, PartId, TessellatedFace};
 use rustc_hash::FxHashMap;
@@ -28,13 +28,17 @@ pub(super) fn place_instances(
     parts: &[Option<PartMesh>],
     joined: &FxHashMap<usize, PartMesh>,
 ) -> Placed {
+    let mesh_of = |i: usize, instance: &Instance| joined.get(&i).or(parts[instance.part.0 as usize].as_ref());
+    let placed =
+        model.instances.iter().enumerate().filter_map(|(i, instance)| Some((instance, mesh_of(i, instance)?)));
+    let made = Tessellation { mesh: with_room(model, placed), ..Tessellation::default() };
     let originals = (0..model.placed_face_count() as u32).map(FaceId).collect();
-    let mut out = Placed { made: Tessellation::default(), failed: Vec::new(), repairs: Vec::new(), originals };
+    let mut out = Placed { made, failed: Vec::new(), repairs: Vec::new(), originals };
     // Turned and moved facets are as far from the spline as they were; scaled ones are not, and mirrored ones have other corners first.
     let mut first_copies: FxHashMap<(PartId, u64, bool), FaceId> = FxHashMap::default();
     for (i, (instance, first)) in model.instances.iter().zip(model.first_faces()).enumerate() {
         let part = model.part(instance.part);
-        let Some(mesh) = joined.get(&i).or(parts[instance.part.0 as usize].as_ref()) else { continue };
+        let Some(mesh) = mesh_of(i, instance) else { continue };
         if !joined.contains_key(&i) {
             let kind = (instance.part, instance.placement.scale.to_bits(), instance.placement.is_mirrored());
             let original = *first_copies.entry(kind).or_insert(first);
@@ -63,6 +67,30 @@ pub(super) fn place_instances(
     }
     drop_unused(&mut out.made.mesh);
     out
+}
+
+/// Allocates an empty mesh with room for the meshes of all instances, in huge pages where it is large: rays read its corners at random.
+fn with_room<'a>(model: &Model, placed: impl Iterator<Item = (&'a Instance, &'a PartMesh)>) -> FacetMesh {
+    let (mut positions, mut vertices, mut facets) = (0, 0, 0);
+    for (instance, mesh) in placed {
+        positions += mesh.shared.len();
+        for face in mesh.faces.iter().flatten() {
+            positions += face.own.len();
+            vertices += face.corners.len();
+            facets += face.facets.len();
+        }
+        for ready in &model.part(instance.part).tessellated {
+            positions += ready.mesh.positions.len();
+            vertices += ready.mesh.vertices.len();
+            facets += ready.mesh.facets.len();
+        }
+    }
+    FacetMesh {
+        positions: huge_pages::with_capacity(positions),
+        vertices: huge_pages::with_capacity(vertices),
+        facets: huge_pages::with_capacity(facets),
+        sag: huge_pages::with_capacity(facets),
+    }
 }
 
 /// Appends the facets of face `id` with its own positions. `shared` is the index at which the instance's shared positions begin; bounds and
@@ -126,7 +154,7 @@ fn drop_unused(mesh: &mut FacetMesh) {
     for v in mesh.facets.iter().flat_map(|f| f.vertices) {
         name[mesh.vertices[v as usize].position as usize] = 0;
     }
-    let mut kept = Vec::new();
+    let mut kept = huge_pages::with_capacity(mesh.positions.len());
     for (slot, &p) in name.iter_mut().zip(&mesh.positions) {
         if *slot == 0 {
             *slot = kept.len() as u32;
