@@ -10,6 +10,8 @@ use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::{input_files, threads};
 use crate::cli::{completion::Completion, failure::Failure};
 use crate::formats::{ErrorKind, FACET_EXTENSIONS, is_facet_file, lower_extension, write_facets};
+use crate::math::Point;
+use crate::mesh::FacetMesh;
 use crate::model::Model;
 use crate::pipeline::{mesh_settings, settings_for_accurate_facets, tessellate_model};
 use crate::report::{bytes, seconds, tolerance_text};
@@ -65,6 +67,18 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
         write_facets(path, &facets)?;
         spinner.finish_and_clear();
         console.say(format_args!("wrote {}", path.display()));
+        let finest = made.report.tolerance_mm.min;
+        if lower_extension(path) == "stl"
+            && let Some(moved) = single_precision_beyond(&made.mesh, finest)
+        {
+            console.say(format_args!(
+                "{}: STL has single precision, by which corners this far from the origin move by up to {} mm, more than the tolerance of {} mm; \
+                 .ply, .obj and .vtu keep them",
+                path.display(),
+                figures(moved, 2),
+                figures(finest, 4)
+            ));
+        }
     }
     let baseline = command.baseline.then(|| Baseline::run(&loaded.model, made.report.tolerance_mm.min));
     if console.json {
@@ -102,6 +116,14 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
         }
     }
     Ok(refused.and(Completion::incomplete_if(over)))
+}
+
+/// Returns by how much rounding to single precision may move a corner, mm, where that is more than `tolerance_mm`.
+fn single_precision_beyond(mesh: &FacetMesh, tolerance_mm: f64) -> Option<f64> {
+    let farthest = mesh.positions.iter().map(|p| p.abs()).fold(Point::ZERO, Point::max);
+    // Half of the spacing along each axis.
+    let moved = farthest.length() * f64::from(f32::EPSILON) / 2.0;
+    (moved > tolerance_mm).then_some(moved)
 }
 
 /// What truck-meshalgo makes of the same model; `facet --json` has it under `baseline`.
@@ -239,4 +261,19 @@ fn meshing_summary(r: &Report) -> String {
     let peak = r.peak_bytes.map_or(String::new(), |b| format!("; {} at most", bytes(b)));
     line("time", format!("read {}, tessellate {}{peak}", seconds(r.seconds.read), seconds(r.seconds.tessellate)));
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn single_precision_is_named_where_it_moves_corners_beyond_the_tolerance() {
+        let at =
+            |x: f64| FacetMesh { positions: vec![Point::ZERO, Point::new(-x, 0.0, 0.0)], ..FacetMesh::default() };
+        // Numbers of 2^20 are 1/8 apart in 24 bits.
+        assert_eq!(single_precision_beyond(&at(1048576.0), 0.05), Some(0.0625));
+        assert_eq!(single_precision_beyond(&at(1048576.0), 0.0625), None);
+        assert_eq!(single_precision_beyond(&at(1000.0), 0.05), None);
+    }
 }
