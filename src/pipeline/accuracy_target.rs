@@ -9,9 +9,9 @@ use super::settings::{IntersectorKind, MeshingSettings, TracingSettings};
 use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::{Ray, Vector};
 use crate::model::Model;
-use crate::simulate::{RunSettings, Scene, simulate};
+use crate::simulate::{MediaBeside, RunSettings, Scene, simulate};
 use crate::study::accuracy_target::{AccuracyResult, AccuracyTarget, JobLight, meet_target, meet_target_for_light};
-use crate::study::{ModelMeshSource, Progress};
+use crate::study::{MeshSource, ModelMeshSource, Progress};
 
 /// How far above a surface a ray starts that left it and meets nothing more, mm: facets lie at most 0.8 mm off the surface here.
 const RAY_LIFT_MM: f64 = 1.0;
@@ -74,8 +74,9 @@ pub fn settings_for_accuracy(
                 let settings = RunSettings { rays: count, seed, path_samples: 0, ..RunSettings::from(&scene.run) };
                 scene_rays(traced_on, model, &settings, bound)
             };
-            let relative_index = |face| bound.entered_body(face).map(|body| bound.relative_index(body));
-            let light = JobLight { rays: &rays, relative_index: &relative_index };
+            let settings = RunSettings::from(&scene.run);
+            let media = MediaBeside::new(bound, source.exact(), &settings);
+            let light = JobLight { rays: &rays, index_ratio: &|ray, hit| media.index_ratio(ray, hit) };
             meet_target_for_light(model, &source, &ask, light, &progress)
         }
     });

@@ -73,6 +73,7 @@ pub use error::{Error, ErrorKind};
 pub use face_results::{FaceResult, FaceResults};
 pub use fingerprint::{Fingerprint, FingerprintHasher};
 pub use hooks::{Hooks, Progress, ReplicateHook, TracedRun};
+pub use kernel::MediaBeside;
 pub use listed_rays::{ListedEnd, MOST_LISTED_RAYS, listed_ends, ray_lists};
 pub use outcome::{Counts, Event, LostCause, LostRay, PathSink, PathVertex};
 pub use partial_run::PartialRun;

@@ -800,6 +800,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "contact",
             "interaction",
             "media_at",
+            "media_beside",
             "crossing",
             "start",
             "stated_start",

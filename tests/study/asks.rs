@@ -240,7 +240,7 @@ fn rays_that_facets_alone_send_must_keep_what_is_asked() {
         let rays = |traced_on: &dyn Intersector, _: u64, count: u64| {
             beam(if std::ptr::addr_eq(traced_on, source.exact()) { central } else { on_facets }, count)
         };
-        let light = JobLight { rays: &rays, relative_index: &|_| None };
+        let light = JobLight { rays: &rays, index_ratio: &|_, _| None };
         meet_target_for_light(&ball.model, &source, &target, light, &|_| ()).unwrap()
     };
     let [alike, apart] = [reached(central), reached(grazing)];
@@ -268,7 +268,7 @@ fn hits_on_flat_faces_do_not_make_up_for_others() {
             };
             (0..count).map(|k| Ray::new(Vector::new(x(k), 0.1, -50.0), Vector::Z)).collect()
         };
-        let light = JobLight { rays: &rays, relative_index: &|_| None };
+        let light = JobLight { rays: &rays, index_ratio: &|_, _| None };
         meet_target_for_light(&model, &source, &target, light, &|_| ()).unwrap()
     };
     let [alone, rare] = [found(1), found(200)];

@@ -13,6 +13,7 @@ mod default_figures;
 mod files;
 #[cfg(feature = "truck")]
 mod known_scenes;
+mod media_beside;
 mod models;
 mod stability;
 mod support;

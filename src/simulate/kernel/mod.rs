@@ -14,6 +14,7 @@ mod crossing;
 mod emission;
 mod interaction;
 mod media_at;
+mod media_beside;
 mod path;
 pub(crate) mod payload;
 mod receiver_index;
@@ -28,6 +29,7 @@ mod tracer;
 mod wavefront;
 
 pub(crate) use context::Context;
+pub use media_beside::MediaBeside;
 pub(crate) use path::RaySelection;
 pub(crate) use simd_dispatch::trace;
 pub(super) use tolerances::in_front;

@@ -10,13 +10,15 @@
 //! 99th percentile, and rays that no angle stands for. Known weakness: other rays (more grazing ones) err more.
 
 mod direction_error;
+mod light;
 mod search;
 mod solution;
 mod survey;
 mod trial_rays;
 
 pub use super::tolerance_plan::{RelativeTolerance, TolerancePlan};
-pub use search::{JobLight, RayGenerator, meet_target, meet_target_for_light};
+pub use light::{JobLight, RayGenerator};
+pub use search::{meet_target, meet_target_for_light};
 
 use crate::intersect::NormalMode;
 use serde::Serialize;

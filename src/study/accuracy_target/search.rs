@@ -1,11 +1,12 @@
 //! The search for the cheapest tolerances and normals that meet an accuracy target.
 
+use super::light::JobLight;
 use super::solution::{JobWork, Solution};
 use super::survey::{Survey, tolerance_factor};
 use super::trial_rays::{DirectionErrors, ReferenceRays};
 use super::{AccuracyResult, AccuracyTarget, Trial};
 use crate::intersect::{Cost, Intersector, NormalMode};
-use crate::math::{FaceId, Ray};
+use crate::math::FaceId;
 use crate::model::Model;
 use crate::study::Progress;
 use crate::study::mesh_source::{FacetTree, MeshSource, with_intersectors};
@@ -34,18 +35,6 @@ const ATTEMPTS: usize = 6;
 /// All meshes of a search together may have so many times the facets that one may: a few attempts at the finest.
 const LARGEST_MESHES: f64 = 3.0;
 
-/// Rays of a job on these surfaces, by seed and number.
-pub type RayGenerator<'r> = dyn Fn(&dyn Intersector, u64, u64) -> Vec<Ray> + Sync + 'r;
-
-/// The light of a job.
-#[derive(Clone, Copy)]
-pub struct JobLight<'r> {
-    /// Its rays.
-    pub rays: &'r RayGenerator<'r>,
-    /// The index of the body that a face bounds over that around it; `None` where no light passes the face.
-    pub relative_index: &'r (dyn Fn(FaceId) -> Option<f64> + Sync),
-}
-
 /// Finds the cheapest tolerances and normals that reach an accuracy, for random rays through the model; the best found where none reaches
 /// it. Makes several meshes for each kind of normals, on the current rayon pool, and ends after a counted amount of work.
 ///
@@ -64,7 +53,7 @@ pub fn meet_target(
         source.rays(0..source.len())
     };
     // Of a bare model it is not known which faces are glass.
-    let light = JobLight { rays: &uniform, relative_index: &|_| None };
+    let light = JobLight { rays: &uniform, index_ratio: &|_, _| None };
     meet_target_for_light(model, mesh_source, target, light, progress)
 }
 
@@ -85,7 +74,8 @@ pub fn meet_target_for_light(
     let clock = Clock::new(progress);
     // The spline's hits are the truth, and show which faces matter and how sharply they bend.
     clock.report("pilot rays", 0.0);
-    let pilots = ReferenceRays::new(mesh_source, (light.rays)(mesh_source.exact(), target.seed, PILOTS));
+    let rays = (light.rays)(mesh_source.exact(), target.seed, PILOTS);
+    let pilots = ReferenceRays::new(mesh_source, rays, light);
     let survey = Survey::new(model, &pilots.rays, &pilots.truth);
     let coarse = coarse_tolerance(model);
     let search = Search {
@@ -224,8 +214,8 @@ impl Search<'_> {
             // Another seed for each set: facets tuned to one set of rays must not be judged by it.
             let seed = self.target.seed ^ self.fresh.get().wrapping_mul(0x9e37_79b9_7f4a_7c15);
             let rays = (self.light.rays)(traced_on, seed, self.target.check_rays);
-            let fresh = ReferenceRays::new(self.mesh_source, rays);
-            fresh.compare(facets, apart_mm, &self.light.relative_index, &self.survey)
+            let fresh = ReferenceRays::new(self.mesh_source, rays, self.light);
+            fresh.compare(facets, apart_mm, &self.survey)
         })
     }
 
@@ -247,9 +237,8 @@ impl Search<'_> {
         let coarser = (0.25 * self.coarse / plan.unbounded_mm()).max(1.0);
         let mut pilot = plan.clone();
         pilot.scale(coarser);
-        let m = self.measure(&pilot, normals, |facets, apart_mm| {
-            self.pilots.compare(facets, apart_mm, &self.light.relative_index, &self.survey)
-        });
+        let m =
+            self.measure(&pilot, normals, |facets, apart_mm| self.pilots.compare(facets, apart_mm, &self.survey));
         let mut facets = m.made.len() as f64;
         // The pilots measured the coarser plan: their errors are judged against what that one should give.
         if normals != NormalMode::Exact {

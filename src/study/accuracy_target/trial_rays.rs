@@ -1,44 +1,45 @@
 //! Rays that facets are tried with, and how far off they send them.
 
 use super::direction_error::error_of_hit;
+use super::light::JobLight;
 use super::survey::{Survey, p99};
 use crate::intersect::{Cost, Hit, Intersector};
 use crate::math::{FaceId, Ray};
 use crate::study::mesh_source::{MeshSource, answer};
+use rayon::prelude::*;
 use std::time::Instant;
 
 /// Rays with their exact hits.
 pub(super) struct ReferenceRays {
     pub(super) rays: Vec<Ray>,
     pub(super) truth: Vec<Option<Hit>>,
+    /// Of each ray that hits something the refractive index before its hit over that behind it; `None` where no light passes.
+    index_ratios: Vec<Option<f64>>,
 }
 
 impl ReferenceRays {
-    /// Asks the spline all rays, on the current rayon pool, and keeps its hits.
-    pub(super) fn new(mesh_source: &dyn MeshSource, rays: Vec<Ray>) -> Self {
+    /// Traces all rays on the spline, on the current rayon pool, and keeps its hits, with the indices that `light` has there.
+    pub(super) fn new(mesh_source: &dyn MeshSource, rays: Vec<Ray>, light: JobLight<'_>) -> Self {
         let mut truth = vec![None; rays.len()];
         answer(mesh_source.exact(), &rays, rayon::current_num_threads(), &mut truth);
-        Self { rays, truth }
+        let index_ratio = |(ray, hit): (&Ray, &Option<Hit>)| (light.index_ratio)(ray, hit.as_ref()?);
+        let index_ratios = rays.par_iter().zip(&truth).map(index_ratio).collect();
+        Self { rays, truth, index_ratios }
     }
 
-    /// Asks facets the rays, on the current rayon pool, and compares where light goes with the spline, as
-    /// [`error_of_hit`] does; what hits flat faces, of which `survey` knows, is only counted.
-    pub(super) fn compare(
-        &self,
-        facets: &dyn Intersector,
-        apart_mm: f64,
-        relative_index: &dyn Fn(FaceId) -> Option<f64>,
-        survey: &Survey,
-    ) -> DirectionErrors {
+    /// Traces the rays on facets, on the current rayon pool, and compares where light goes with the spline, as [`error_of_hit`] does; what
+    /// hits flat faces, of which `survey` knows, is only counted.
+    pub(super) fn compare(&self, facets: &dyn Intersector, apart_mm: f64, survey: &Survey) -> DirectionErrors {
         let mut hits = vec![None; self.rays.len()];
         let start = Instant::now();
         let cost = answer(facets, &self.rays, rayon::current_num_threads(), &mut hits);
         let mut found = DirectionErrors { cost, seconds: start.elapsed().as_secs_f64(), ..Default::default() };
-        for ((ray, hit), truth) in self.rays.iter().zip(&hits).zip(&self.truth) {
+        let truths = self.truth.iter().zip(&self.index_ratios);
+        for ((ray, hit), (truth, &index_ratio)) in self.rays.iter().zip(&hits).zip(truths) {
             let error = match (hit, truth) {
                 (None, None) => continue,
                 (Some(hit), Some(truth)) => {
-                    let error = error_of_hit(ray.direction, [hit, truth], apart_mm, relative_index);
+                    let error = error_of_hit(ray.direction, [hit, truth], apart_mm, index_ratio);
                     error.map(|error| (truth.face, error))
                 }
                 _ => None,
