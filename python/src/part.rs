@@ -146,7 +146,7 @@ impl Part {
             ));
         }
         let mut run = self.run.clone();
-        run.merge(&other.run).map_err(PyValueError::new_err)?;
+        run.merge(&other.run).map_err(|e| PyValueError::new_err(e.to_string()))?;
         let of = self.of.as_ref().or(other.of.as_ref()).cloned();
         Ok(Self { run, header: self.header.clone(), of })
     }

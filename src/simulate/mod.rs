@@ -37,6 +37,7 @@ mod listed_rays;
 mod lost_light;
 mod outcome;
 mod partial_run;
+mod partial_run_error;
 mod partial_run_file;
 mod path_sample;
 mod plan;
@@ -77,6 +78,7 @@ pub use kernel::MediaBeside;
 pub use listed_rays::{ListedEnd, MOST_LISTED_RAYS, listed_ends, ray_lists};
 pub use outcome::{Counts, Event, LostCause, LostRay, PathSink, PathVertex};
 pub use partial_run::PartialRun;
+pub use partial_run_error::PartialRunError;
 pub use path_sample::PathSample;
 pub use plan::GROWING_REPLICATE;
 // Reports level the rings of their grids too.

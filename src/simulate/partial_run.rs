@@ -2,6 +2,7 @@
 //! together to the bits of a single run.
 
 use super::bind::BoundScene;
+use super::partial_run_error::PartialRunError;
 use super::tallies::{ReplicateTally, Tallies};
 
 /// The replicates of a run that are done.
@@ -53,14 +54,14 @@ impl PartialRun {
     ///
     /// # Errors
     /// When both have a replicate in common, or are parts of different runs; nothing is added then.
-    pub fn merge(&mut self, other: &Self) -> Result<(), String> {
+    pub fn merge(&mut self, other: &Self) -> Result<(), PartialRunError> {
         // Parts of a run that grows may come from different totals; what they must share is that it grows.
         let same_run = self.grows == other.grows && (self.grows || self.replicates == other.replicates);
         if !same_run || !same_shape(&self.tallies, &other.tallies) {
-            return Err("it is part of another run".into());
+            return Err(PartialRunError::OtherRun);
         }
-        if let Some(twice) = other.done.iter().find(|r| self.done.binary_search(r).is_ok()) {
-            return Err(format!("its replicate {twice} is in an earlier part already; each part counts once"));
+        if let Some(repeated) = other.done.iter().find(|r| self.done.binary_search(r).is_ok()) {
+            return Err(PartialRunError::RepeatedReplicate(*repeated));
         }
         self.add(other);
         self.replicates = self.replicates.max(other.replicates);

@@ -7,6 +7,7 @@ use super::bind::BoundScene;
 use super::digest::Fnv;
 use super::outcome::{Counts, LostRay, PathVertex};
 use super::partial_run::PartialRun;
+use super::partial_run_error::PartialRunError;
 use super::path_sample::PathSample;
 use super::sequence::Sequence;
 use super::sequence_sums::SequenceSums;
@@ -74,7 +75,7 @@ impl PartialRun {
         to.write_all(&Fnv::hash(&[&out]).to_le_bytes())
     }
 
-    /// Reads the file for a scene, after `check` has found the header good.
+    /// Reads the file for a scene, after `check` has found the header good or said why it is not.
     ///
     /// # Errors
     /// When the bytes are no such file or are damaged, `check` refuses the header, or the sums are those of another scene.
@@ -82,9 +83,9 @@ impl PartialRun {
         bytes: &[u8],
         check: impl FnOnce(&H) -> Result<(), String>,
         bound: &BoundScene,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, PartialRunError> {
         let (header, r) = open_tally_file::<H>(bytes)?;
-        check(&header)?;
+        check(&header).map_err(PartialRunError::RefusedHeader)?;
         r.part(Tallies::new(bound))
     }
 
@@ -93,7 +94,7 @@ impl PartialRun {
     ///
     /// # Errors
     /// When the bytes are no such file or are damaged, or hold more than any scene has.
-    pub fn read_alone<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Self), String> {
+    pub fn read_alone<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Self), PartialRunError> {
         let (header, r) = open_tally_file(bytes)?;
         let r = Reader { sums_left: Some(MOST_SUMS_ALONE), ..r };
         Ok((header, r.part(Tallies::default())?))
@@ -103,7 +104,7 @@ impl PartialRun {
     ///
     /// # Errors
     /// When the bytes are no such file or are damaged.
-    pub fn header<H: DeserializeOwned>(bytes: &[u8]) -> Result<H, String> {
+    pub fn header<H: DeserializeOwned>(bytes: &[u8]) -> Result<H, PartialRunError> {
         open_tally_file(bytes).map(|(header, _)| header)
     }
 
@@ -140,14 +141,14 @@ fn append_sums(out: &mut Vec<u8>, sums: &[Sum]) {
 ///
 /// # Errors
 /// When the bytes are no such file or are damaged.
-fn open_tally_file<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Reader<'_>), String> {
+fn open_tally_file<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Reader<'_>), PartialRunError> {
     if MAGIC.starts_with(bytes) {
-        return Err("the file is cut short".into());
+        return Err(PartialRunError::CutShort);
     }
-    let rest = bytes.strip_prefix(MAGIC).ok_or("not a tally file of this version")?;
-    let (rest, _) = rest.split_last_chunk::<CHECKSUM_BYTES>().ok_or("the file is cut short")?;
+    let rest = bytes.strip_prefix(MAGIC).ok_or(PartialRunError::NotTallyFile)?;
+    let (rest, _) = rest.split_last_chunk::<CHECKSUM_BYTES>().ok_or(PartialRunError::CutShort)?;
     if !ends_in_checksum(bytes) {
-        return Err("the file is damaged or cut short: its checksum is wrong".into());
+        return Err(PartialRunError::WrongChecksum);
     }
     let mut reader = Reader { bytes: rest, sums_left: None };
     let header = reader.json()?;
@@ -172,37 +173,37 @@ struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     /// Takes the next `n` bytes off; an error when there are fewer.
-    fn take(&mut self, n: u64) -> Result<&'a [u8], String> {
-        let n = usize::try_from(n).ok().filter(|n| *n <= self.bytes.len()).ok_or("the file is cut short")?;
+    fn take(&mut self, n: u64) -> Result<&'a [u8], PartialRunError> {
+        let n = usize::try_from(n).ok().filter(|n| *n <= self.bytes.len()).ok_or(PartialRunError::CutShort)?;
         let (taken, rest) = self.bytes.split_at(n);
         self.bytes = rest;
         Ok(taken)
     }
 
-    fn array<const N: usize>(&mut self) -> Result<[u8; N], String> {
-        self.take(N as u64)?.try_into().map_err(|_| "the file is cut short".into())
+    fn array<const N: usize>(&mut self) -> Result<[u8; N], PartialRunError> {
+        self.take(N as u64)?.try_into().map_err(|_| PartialRunError::CutShort)
     }
 
-    fn u32(&mut self) -> Result<u32, String> {
+    fn u32(&mut self) -> Result<u32, PartialRunError> {
         self.array().map(u32::from_le_bytes)
     }
 
-    fn u64(&mut self) -> Result<u64, String> {
+    fn u64(&mut self) -> Result<u64, PartialRunError> {
         self.array().map(u64::from_le_bytes)
     }
 
     /// Takes a part off into sums that are empty.
-    fn part(mut self, empty: Tallies) -> Result<PartialRun, String> {
+    fn part(mut self, empty: Tallies) -> Result<PartialRun, PartialRunError> {
         let mut p = PartialRun { replicates: self.u32()?, tallies: empty, ..PartialRun::default() };
         p.grows = self.u32()? != 0;
         let done = self.u32()?;
         if done > p.replicates {
-            return Err("it has more replicates than its run".into());
+            return Err(PartialRunError::Inconsistent("it has more replicates than its run"));
         }
         p.done = (0..done).map(|_| self.u32()).collect::<Result<_, _>>()?;
         // In order and each once, or `merge` would count a replicate twice.
         if p.done.windows(2).any(|w| w[0] >= w[1]) || p.done.last().is_some_and(|&r| r >= p.replicates) {
-            return Err("its replicates are out of order".into());
+            return Err(PartialRunError::Inconsistent("its replicates are out of order"));
         }
         p.seconds = f64::from_le_bytes(self.array()?);
         let t = &mut p.tallies;
@@ -221,7 +222,7 @@ impl<'a> Reader<'a> {
         self.sums(&mut t.instances)?;
         self.sums(&mut t.bulk)?;
         if self.u64()? != t.ends.len() as u64 {
-            return Err("it has other ends of light".into());
+            return Err(PartialRunError::Inconsistent("it has other ends of light"));
         }
         self.filled_sums(&mut t.ends)?;
         for m in &mut t.moments {
@@ -245,8 +246,8 @@ impl<'a> Reader<'a> {
         let paths: Vec<(PathVertex, [[u64; 3]; 1], u64)> = self.json()?;
         let limit = self.u32()? as usize;
         let sequences: Vec<(Sequence, Sum)> = self.json()?;
-        t.sequences =
-            SequenceSums::restored(limit, sequences).ok_or("its sequences have no known limit of steps")?;
+        t.sequences = SequenceSums::restored(limit, sequences)
+            .ok_or(PartialRunError::Inconsistent("its sequences have no known limit of steps"))?;
         // Bits, not decimals: what was written comes back exactly.
         let point = |bits: [u64; 3]| bits.map(f64::from_bits).into();
         t.ledger = ledger
@@ -262,7 +263,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads the counts of a run, in the order in which they were written.
-    fn counts(&mut self) -> Result<Counts, String> {
+    fn counts(&mut self) -> Result<Counts, PartialRunError> {
         Ok(Counts {
             rays: self.u64()?,
             segments: self.u64()?,
@@ -280,36 +281,37 @@ impl<'a> Reader<'a> {
     }
 
     /// Takes the next block off and parses it as JSON.
-    fn json<T: DeserializeOwned>(&mut self) -> Result<T, String> {
+    fn json<T: DeserializeOwned>(&mut self) -> Result<T, PartialRunError> {
         let n = self.u64()?;
-        serde_json::from_slice(self.take(n)?).map_err(|e| format!("not a tally file of this version: {e}"))
+        serde_json::from_slice(self.take(n)?).map_err(|e| PartialRunError::Malformed(e.to_string()))
     }
 
     /// Takes the number of lists off, which must be that of `into` where the scene says how many there are.
-    fn lists<T: Clone + Default>(&mut self, into: &mut Vec<T>, count: u64) -> Result<(), String> {
+    fn lists<T: Clone + Default>(&mut self, into: &mut Vec<T>, count: u64) -> Result<(), PartialRunError> {
         if let Some(left) = &mut self.sums_left {
-            *left = left.checked_sub(count).ok_or("it has more sums than any scene")?;
+            *left =
+                left.checked_sub(count).ok_or(PartialRunError::Inconsistent("it has more sums than any scene"))?;
             into.resize(count as usize, T::default());
         }
         if count != into.len() as u64 {
-            return Err("it has other receivers or faces than the scene".into());
+            return Err(PartialRunError::OtherScene);
         }
         Ok(())
     }
 
     /// Takes sums off and writes those that are not empty into `into`, which must have the length that the file states.
-    fn sums(&mut self, into: &mut Vec<Sum>) -> Result<(), String> {
+    fn sums(&mut self, into: &mut Vec<Sum>) -> Result<(), PartialRunError> {
         let count = self.u64()?;
         self.lists(into, count)?;
         self.filled_sums(into)
     }
 
-    fn filled_sums(&mut self, into: &mut [Sum]) -> Result<(), String> {
+    fn filled_sums(&mut self, into: &mut [Sum]) -> Result<(), PartialRunError> {
         for _ in 0..self.u64()? {
             let i = self.u32()? as usize;
             let sum =
                 Sum { total: u128::from_le_bytes(self.array()?), squares: u128::from_le_bytes(self.array()?) };
-            *into.get_mut(i).ok_or("a cell lies outside its receiver")? = sum;
+            *into.get_mut(i).ok_or(PartialRunError::Inconsistent("a cell lies outside its receiver"))? = sum;
         }
         Ok(())
     }

@@ -725,6 +725,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "dispatch",
             "listed_rays",
             "fingerprint",
+            "partial_run_error",
             "partial_run",
             "partial_run_file",
             "power_scale",

@@ -123,7 +123,7 @@ impl<'a> Checkpoint<'a> {
             Failure::arguments(format!("{}: cannot go on from here: {m}", file.display()))
                 .with_help("run with the same scene, files, options and program, remove this file, or run into another place with -o")
         };
-        let saved = PartialRun::read(&bytes, same, &self.prepared.bound).map_err(refuse)?;
+        let saved = PartialRun::read(&bytes, same, &self.prepared.bound).map_err(|e| refuse(e.to_string()))?;
         // The fingerprint of a run that grows leaves its length open: a longer or shorter one would add up to no run.
         let [there, asked] = [saved.replicates, self.prepared.replicate_range().end];
         if there != asked {

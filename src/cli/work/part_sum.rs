@@ -3,7 +3,7 @@
 use super::tally_file::TallyHeader;
 use super::usage::Usage;
 use crate::cli::failure::Failure;
-use crate::simulate::{BoundScene, GROWING_REPLICATE, PartialRun};
+use crate::simulate::{BoundScene, GROWING_REPLICATE, PartialRun, PartialRunError};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -46,8 +46,8 @@ pub(crate) enum PartFailure {
 
 impl PartFailure {
     /// Returns the failure of a file of these bytes.
-    fn new(path: &Path, bytes: &[u8], message: String) -> Self {
-        let failure = input_failure(path, message);
+    fn new(path: &Path, bytes: &[u8], error: &PartialRunError) -> Self {
+        let failure = input_failure(path, error);
         if PartialRun::is_cut_short(bytes) { Self::CutShort(failure) } else { Self::Lasting(failure) }
     }
 }
@@ -111,7 +111,7 @@ impl PartSum {
             if self.files.is_empty() {
                 self.total = part;
             } else {
-                self.total.merge(&part).map_err(|message| self.not_merged(file, message, &part, bound))?;
+                self.total.merge(&part).map_err(|error| self.not_merged(file, &error, &part, bound))?;
             }
             self.origins.add(origins);
             self.files.insert(file.clone(), stamp);
@@ -137,7 +137,7 @@ impl PartSum {
         };
         let bytes = read_part(path)?;
         let part =
-            PartialRun::read(&bytes, check, bound).map_err(|message| PartFailure::new(path, &bytes, message))?;
+            PartialRun::read(&bytes, check, bound).map_err(|error| PartFailure::new(path, &bytes, &error))?;
         Ok((part, origins))
     }
 
@@ -174,9 +174,9 @@ impl PartSum {
     }
 
     /// Says why a part cannot be added to the others, which are read again, and which of them holds the same.
-    fn not_merged(&self, path: &Path, message: String, part: &PartialRun, bound: &BoundScene) -> Failure {
+    fn not_merged(&self, path: &Path, error: &PartialRunError, part: &PartialRun, bound: &BoundScene) -> Failure {
         let shares = |other: &PartialRun| part.done.iter().any(|k| other.done.binary_search(k).is_ok());
-        let failure = input_failure(path, message);
+        let failure = input_failure(path, error);
         match self.files.keys().find(|file| self.read(file, bound).is_ok_and(|(other, _)| shares(&other))) {
             Some(file) => failure.with_help(format!("{} holds it too: leave one of the two out", file.display())),
             None => failure,
@@ -212,7 +212,7 @@ pub(crate) fn input_failure(path: &Path, message: impl std::fmt::Display) -> Fai
 /// Returns the header of a part.
 pub(crate) fn read_header(path: &Path) -> Result<TallyHeader, PartFailure> {
     let bytes = read_part(path)?;
-    PartialRun::header(&bytes).map_err(|message| PartFailure::new(path, &bytes, message))
+    PartialRun::header(&bytes).map_err(|error| PartFailure::new(path, &bytes, &error))
 }
 
 /// Returns the bytes of a part.
