@@ -10,7 +10,9 @@ use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::{Ray, Vector};
 use crate::model::Model;
 use crate::simulate::{MediaBeside, RunSettings, Scene, simulate};
-use crate::study::accuracy_target::{AccuracyResult, AccuracyTarget, JobLight, meet_target, meet_target_for_light};
+use crate::study::accuracy_target::{
+    AccuracyResult, AccuracyTarget, AngleError, JobLight, meet_target, meet_target_for_light,
+};
 use crate::study::{MeshSource, ModelMeshSource, Progress};
 
 /// How far above a surface a ray starts that left it and meets nothing more, mm: facets lie at most 0.8 mm off the surface here.
@@ -126,8 +128,8 @@ fn mesh_source<'m>(
 }
 
 /// Returns the error of an angle that nothing can be aimed at.
-fn refused_angle(message: String) -> Error {
-    Error::setting("accuracy", message)
+fn refused_angle(error: AngleError) -> Error {
+    Error::setting("accuracy", error.to_string())
 }
 
 /// Returns the target for a direction error, degrees; `None` without one.

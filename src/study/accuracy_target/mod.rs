@@ -45,16 +45,23 @@ pub struct AccuracyTarget {
     pub seed: u64,
 }
 
+/// An angle that no accuracy can be aimed at.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("{angle_deg}: an angle above 0 and below 90 degrees is needed, as 0.05")]
+pub struct AngleError {
+    angle_deg: f64,
+}
+
 impl AccuracyTarget {
     /// Refuses an angle that nothing can be aimed at.
     ///
     /// # Errors
     /// When it is not above 0 and below 90 degrees; the message says so.
-    pub fn check_angle(&self) -> Result<(), String> {
+    pub fn check_angle(&self) -> Result<(), AngleError> {
         if self.angle_deg > 0.0 && self.angle_deg < 90.0 {
             return Ok(());
         }
-        Err(format!("{}: an angle above 0 and below 90 degrees is needed, as 0.05", self.angle_deg))
+        Err(AngleError { angle_deg: self.angle_deg })
     }
 
     /// Returns the defaults for an angle: a job of a million rays, checked on 100,000, and meshes that take a minute and a half of one

@@ -4,7 +4,7 @@ use super::light::JobLight;
 use super::solution::{JobWork, Solution};
 use super::survey::{Survey, tolerance_factor};
 use super::trial_rays::{DirectionErrors, ReferenceRays};
-use super::{AccuracyResult, AccuracyTarget, Trial};
+use super::{AccuracyResult, AccuracyTarget, AngleError, Trial};
 use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::FaceId;
 use crate::model::Model;
@@ -45,7 +45,7 @@ pub fn meet_target(
     mesh_source: &dyn MeshSource,
     target: &AccuracyTarget,
     progress: &(dyn Fn(Progress) + Sync),
-) -> Result<AccuracyResult, String> {
+) -> Result<AccuracyResult, AngleError> {
     // Of the surfaces, not of facets: there are none yet.
     let bounds = model.surface_bounds();
     let uniform = |_: &dyn Intersector, seed: u64, count: u64| {
@@ -68,7 +68,7 @@ pub fn meet_target_for_light(
     target: &AccuracyTarget,
     light: JobLight<'_>,
     progress: &(dyn Fn(Progress) + Sync),
-) -> Result<AccuracyResult, String> {
+) -> Result<AccuracyResult, AngleError> {
     target.check_angle()?;
     let start = Instant::now();
     let clock = Clock::new(progress);
