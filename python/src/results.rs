@@ -2,7 +2,7 @@
 
 use crate::accounts::model_notes;
 use crate::arrays::{columns, flat, rows, shaped};
-use crate::errors::{SceneError, of_json};
+use crate::errors::{SceneError, of_json, of_pipeline};
 use lampyris::formats::{Axis, ColourMap, Grid, Picture};
 use lampyris::pipeline::{PreparedScene, SceneResults};
 use lampyris::regulation::Regulation;
@@ -106,7 +106,7 @@ impl Results {
 
     /// The verdicts of the scene's regulations, in its order, as a list of the objects of `assess`.
     fn verdicts_json(&self, py: Python<'_>) -> PyResult<String> {
-        let verdicts = py.detach(|| self.found.verdicts(&self.scene)).map_err(SceneError::new_err)?;
+        let verdicts = py.detach(|| self.found.verdicts(&self.scene)).map_err(of_pipeline)?;
         let documents: Vec<Value> = verdicts.iter().map(|v| v.assessment.document()).collect();
         serde_json::to_string(&documents).map_err(of_json)
     }
@@ -243,8 +243,9 @@ pub(crate) fn assess(
     }
     let wanted = RegulationUse { id: regulation.into(), receiver: Some(r.name.clone()), left_hand, as_placed };
     let judged = py.detach(|| results.found.verdict(&results.scene, &wanted)).map_err(|e| {
-        let reason = e.trim_end_matches(LIST_OF_COMMAND).trim_end_matches([' ', '…']);
-        let all = if reason.len() < e.len() { "; lampyris.regulations() has all of them" } else { "" };
+        let message = e.to_string();
+        let reason = message.trim_end_matches(LIST_OF_COMMAND).trim_end_matches([' ', '…']);
+        let all = if reason.len() < message.len() { "; lampyris.regulations() has all of them" } else { "" };
         SceneError::new_err(format!("{reason}{all}"))
     })?;
     serde_json::to_string(&judged.assessment.document()).map_err(of_json)

@@ -2,7 +2,7 @@
 
 use super::console::Console;
 use crate::formats::{printable, printable_in_place, printable_line};
-use crate::{pipeline, simulate, step};
+use crate::{pipeline, regulation, simulate, step};
 use annotate_snippets::renderer::DecorStyle;
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 use std::io::Write;
@@ -148,6 +148,12 @@ impl From<pipeline::Error> for Failure {
             Some(x) => failure.with_excerpt(&x.file, &x.text, x.span.clone(), x.label),
             None => failure,
         }
+    }
+}
+
+impl From<regulation::Error> for Failure {
+    fn from(e: regulation::Error) -> Self {
+        Self::arguments(e.to_string())
     }
 }
 

@@ -1,6 +1,6 @@
 //! Why a job cannot be done, and what to do about it.
 
-use crate::{simulate, step};
+use crate::{regulation, simulate, step};
 use std::ops::Range;
 
 /// What kind of mistake an [`Error`] is.
@@ -113,6 +113,12 @@ impl Error {
 impl From<step::Error> for Error {
     fn from(e: step::Error) -> Self {
         Self::input(e.to_string())
+    }
+}
+
+impl From<regulation::Error> for Error {
+    fn from(e: regulation::Error) -> Self {
+        Self::request(e.to_string())
     }
 }
 

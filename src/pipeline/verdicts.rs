@@ -1,5 +1,6 @@
 //! Verdicts of the regulations that a scene names, about the far fields of its run.
 
+use super::error::Error;
 use super::prepared_scene::PreparedScene;
 use super::scene_results::SceneResults;
 use crate::regulation::{
@@ -27,7 +28,7 @@ fn intensities(
     receiver: &ReceiverResult,
     geometric: Option<&[f64]>,
     rays: RaySample,
-) -> Result<IntensityMap, String> {
+) -> Result<IntensityMap, Error> {
     let edges = |k: usize| even_edges(receiver.middle[k], receiver.half[k], receiver.grid[k]);
     let known = geometric.filter(|errors| errors.len() == receiver.cells.len());
     let cells = (receiver.cells.iter().zip(cell_errors(receiver)).enumerate())
@@ -47,9 +48,11 @@ pub(super) fn verdict(
     prepared: &PreparedScene,
     results: &Results,
     geometric: impl Fn(usize) -> Option<Vec<f64>>,
-) -> Result<ReceiverVerdict, String> {
+) -> Result<ReceiverVerdict, Error> {
     let regulation = Regulation::find(&wanted.id)?;
-    let receiver = wanted.receiver_index(&prepared.job.scene).ok_or("the scene has no such far field")?;
+    let receiver = wanted
+        .receiver_index(&prepared.job.scene)
+        .ok_or_else(|| Error::request("the scene has no such far field"))?;
     let errors = geometric(receiver);
     let rays = RaySample { heaviest_flux: results.heaviest_ray, replicates: results.replicates };
     let map = intensities(&results.receivers[receiver], errors.as_deref(), rays)?;
@@ -68,7 +71,7 @@ impl SceneResults {
     ///
     /// # Errors
     /// When the regulation is not known, or the far field cannot be judged; the message says why.
-    pub fn verdict(&self, prepared: &PreparedScene, wanted: &RegulationUse) -> Result<ReceiverVerdict, String> {
+    pub fn verdict(&self, prepared: &PreparedScene, wanted: &RegulationUse) -> Result<ReceiverVerdict, Error> {
         verdict(wanted, prepared, &self.results, |k| self.geometric_cells(prepared, k))
     }
 
@@ -76,7 +79,7 @@ impl SceneResults {
     ///
     /// # Errors
     /// When a far field cannot be judged; the message says why.
-    pub fn verdicts(&self, prepared: &PreparedScene) -> Result<Vec<ReceiverVerdict>, String> {
+    pub fn verdicts(&self, prepared: &PreparedScene) -> Result<Vec<ReceiverVerdict>, Error> {
         prepared.job.scene.regulations.iter().map(|wanted| self.verdict(prepared, wanted)).collect()
     }
 }

@@ -1,6 +1,7 @@
 //! A far field as a photometer reads it: intensities over azimuth and elevation with the errors of every cell.
 
 use super::cell_axis::{CellAxis, Overlap};
+use super::error::Error;
 use super::few_rays::{LandedRays, MANY_REPLICATES, Noise, RaySample};
 use super::opening::{CellWeights, OpeningSum, Sensor, azimuth_deg, least_share, slope_shares};
 
@@ -61,18 +62,18 @@ impl IntensityMap {
     ///
     /// # Errors
     /// When the edges do not rise, the number of cells is another, or a value is no number.
-    pub fn new(h_edges: Vec<f64>, v_edges: Vec<f64>, cells: Vec<[f64; 3]>) -> Result<Self, String> {
+    pub fn new(h_edges: Vec<f64>, v_edges: Vec<f64>, cells: Vec<[f64; 3]>) -> Result<Self, Error> {
         for (name, edges) in [("H", &h_edges), ("V", &v_edges)] {
             if edges.len() < 2 || !edges.windows(2).all(|e| e[0] < e[1]) {
-                return Err(format!("the edges of {name} do not rise"));
+                return Err(Error::invalid_map(format!("the edges of {name} do not rise")));
             }
         }
         let expected = (h_edges.len() - 1) * (v_edges.len() - 1);
         if cells.len() != expected {
-            return Err(format!("{} cells where the edges make {expected}", cells.len()));
+            return Err(Error::invalid_map(format!("{} cells where the edges make {expected}", cells.len())));
         }
         if cells.iter().flatten().any(|x| !x.is_finite()) {
-            return Err("an intensity or an error is no finite number".into());
+            return Err(Error::invalid_map("an intensity or an error is no finite number"));
         }
         let h = CellAxis::new(h_edges, f64::to_radians);
         let v = CellAxis::new(v_edges, |v| v.to_radians().sin());

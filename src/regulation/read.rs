@@ -1,5 +1,6 @@
 //! The far field of a run, read back from its files.
 
+use super::error::Error;
 use super::few_rays::RaySample;
 use super::map::IntensityMap;
 use std::collections::BTreeMap;
@@ -36,11 +37,13 @@ impl Columns {
     ///
     /// # Errors
     /// When one but that of geometric errors is missing, or several may be the intensity.
-    fn new(header: &str) -> Result<Self, String> {
+    fn new(header: &str) -> Result<Self, Error> {
         let names: Vec<&str> = header.split(',').map(str::trim).collect();
         let place = |wanted: &dyn Fn(&str) -> bool| names.iter().position(|n| wanted(n));
         let needed = |place: Option<usize>, name: &str| {
-            place.ok_or_else(|| format!("no column {name}; a far field over H and V (angles A) is needed"))
+            place.ok_or_else(|| {
+                Error::malformed(format!("no column {name}; a far field over H and V (angles A) is needed"))
+            })
         };
         let h = needed(place(&|n| n == "H_deg"), "H_deg")?;
         let v = needed(place(&|n| n == "V_deg"), "V_deg")?;
@@ -59,19 +62,19 @@ impl Columns {
 ///
 /// # Errors
 /// When there is none, or there are several.
-fn place_of_intensity(names: &[&str]) -> Result<usize, String> {
+fn place_of_intensity(names: &[&str]) -> Result<usize, Error> {
     let known = LUMINOUS.iter().find_map(|known| names.iter().position(|name| name == known));
     let candela: Vec<usize> = (0..names.len()).filter(|&k| names[k].ends_with("_cd")).collect();
     match (known, &candela[..]) {
         (Some(place), _) | (None, &[place]) => Ok(place),
-        (None, []) => Err("no column of candela: set `unit = \"lm\"` in [run] and trace again".into()),
+        (None, []) => Err(Error::malformed("no column of candela: set `unit = \"lm\"` in [run] and trace again")),
         (None, several) => {
             let several: Vec<&str> = several.iter().map(|&k| names[k]).collect();
-            Err(format!(
+            Err(Error::malformed(format!(
                 "the columns {} are all in candela: call the luminous intensity {}",
                 several.join(", "),
                 LUMINOUS[0]
-            ))
+            )))
         }
     }
 }
@@ -89,7 +92,7 @@ impl IntensityMap {
     /// # Errors
     /// When a column is missing, several may be the intensity, a cell stands twice or the cells make no regular grid; the message names the
     /// line where one is at fault.
-    pub fn from_csv(text: &str, rays: Option<RaySample>) -> Result<Self, String> {
+    pub fn from_csv(text: &str, rays: Option<RaySample>) -> Result<Self, Error> {
         Self::from_csv_over(text, None, rays)
     }
 
@@ -99,9 +102,9 @@ impl IntensityMap {
     ///
     /// # Errors
     /// As [`Self::from_csv`].
-    pub fn from_csv_over(text: &str, axes: Option<[[f64; 2]; 2]>, rays: Option<RaySample>) -> Result<Self, String> {
+    pub fn from_csv_over(text: &str, axes: Option<[[f64; 2]; 2]>, rays: Option<RaySample>) -> Result<Self, Error> {
         let mut lines = lines_of_cells(text);
-        let (_, header) = lines.next().ok_or("the file is empty")?;
+        let (_, header) = lines.next().ok_or_else(|| Error::malformed("the file is empty"))?;
         let Columns { names, h, v, intensity, statistical, geometric } = Columns::new(header)?;
         let mut cells: BTreeMap<(i64, i64), [f64; 3]> = BTreeMap::new();
         let [mut columns, mut rows] = [BTreeMap::new(), BTreeMap::new()];
@@ -109,11 +112,12 @@ impl IntensityMap {
         let key = |x: f64| (x / SAME_CENTRE_DEG).round() as i64;
         for (number, line) in lines {
             let values: Vec<&str> = line.split(',').map(str::trim).collect();
-            let value = |place: usize| -> Result<f64, String> {
+            let value = |place: usize| -> Result<f64, Error> {
                 let text = values.get(place).ok_or_else(|| {
-                    format!("line {}: {} values, where the header names {}", number + 1, values.len(), names)
+                    let (line, count) = (number + 1, values.len());
+                    Error::malformed(format!("line {line}: {count} values, where the header names {names}"))
                 })?;
-                text.parse().map_err(|_| format!("line {}: '{text}' is not a number", number + 1))
+                text.parse().map_err(|_| Error::malformed(format!("line {}: '{text}' is not a number", number + 1)))
             };
             let (centre_h, centre_v) = (value(h)?, value(v)?);
             columns.insert(key(centre_h), centre_h);
@@ -122,21 +126,23 @@ impl IntensityMap {
             let cell = [value(intensity)?, value(statistical)?, of_facets];
             // Which of two values holds, the file does not say.
             if cells.insert((key(centre_v), key(centre_h)), cell).is_some() {
-                return Err(format!("line {}: the cell at H {centre_h}, V {centre_v} stands twice", number + 1));
+                let line = number + 1;
+                let message = format!("line {line}: the cell at H {centre_h}, V {centre_v} stands twice");
+                return Err(Error::malformed(message));
             }
         }
         if cells.is_empty() {
-            return Err("the file has a header and no cells".into());
+            return Err(Error::malformed("the file has a header and no cells"));
         }
         // A cell that is missing makes the count wrong.
         if cells.len() != columns.len() * rows.len() {
             let needed = columns.len() * rows.len();
-            return Err(format!(
+            return Err(Error::malformed(format!(
                 "the file has {} cells where its {} values of H and {} of V need {needed}: rows are missing, write it anew",
                 cells.len(),
                 columns.len(),
                 rows.len()
-            ));
+            )));
         }
         let edges =
             |axis, centres: BTreeMap<i64, f64>| edges_between(axis, &centres.into_values().collect::<Vec<_>>());
@@ -163,20 +169,21 @@ pub(crate) fn even_edges(middle: f64, half: f64, cells: usize) -> Vec<f64> {
 }
 
 /// The edges of cells of equal width from their rising centres, degrees; an error for fewer than two or unequal steps.
-fn edges_between(axis: &str, centres: &[f64]) -> Result<Vec<f64>, String> {
+fn edges_between(axis: &str, centres: &[f64]) -> Result<Vec<f64>, Error> {
     let [first, .., last] = centres else {
-        return Err(format!("{axis} has one value: a far field needs at least two cells each way"));
+        let message = format!("{axis} has one value: a far field needs at least two cells each way");
+        return Err(Error::malformed(message));
     };
     // The mean step: single differences carry the rounding of two decimals.
     let step = (last - first) / (centres.len() - 1) as f64;
     if let Some(c) = centres.windows(2).find(|c| (c[1] - c[0] - step).abs() > 10.0 * SAME_CENTRE_DEG) {
-        return Err(format!(
+        return Err(Error::malformed(format!(
             "the cells along {axis} are not of equal width: {step:.3}° on average, but {:.3}° from {} to {}; trace a far field with one \
              width of cells",
             c[1] - c[0],
             c[0],
             c[1]
-        ));
+        )));
     }
     Ok((0..=centres.len()).map(|k| first + step * (k as f64 - 0.5)).collect())
 }
@@ -281,7 +288,7 @@ mod tests {
             ("H_deg,V_deg,a_cd,b_cd,standard_error\n0,0,1,1,1\n", "a_cd, b_cd are all in candela"),
             ("H_deg,V_deg,i_cd,standard_error\n0,0,1,1\n1,0,NaN,1\n0,1,1,1\n1,1,1,1\n", "finite"),
         ] {
-            let error = IntensityMap::from_csv(text, None).unwrap_err();
+            let error = IntensityMap::from_csv(text, None).unwrap_err().to_string();
             assert!(error.contains(message), "{error}");
         }
     }

@@ -2,6 +2,7 @@
 
 use super::aim::Aim;
 use super::assessment::{Assessment, Assumptions};
+use super::error::{Error, ErrorKind};
 use super::judgement::Verdict;
 use super::map::IntensityMap;
 use super::open_aims::judge_by_open_aims;
@@ -26,17 +27,18 @@ impl Regulation {
     ///
     /// # Errors
     /// When the cells are coarser than that; the message says how fine they must be.
-    fn sensor_for(&self, coarsest_deg: f64) -> Result<Sensor, String> {
+    fn sensor_for(&self, coarsest_deg: f64) -> Result<Sensor, Error> {
         let Rules { sensor_half_deg, sensor_widest_half_deg, sensor_round, .. } = self.rules;
         let half_deg = sensor_widest_half_deg
             .map_or(sensor_half_deg, |widest| sensor_half_deg.max(0.5 * coarsest_deg).min(widest));
         // A photometer finer than the cells would read a precision that is not there.
         if coarsest_deg > 2.0 * half_deg * (1.0 + ROUNDED_EDGES) {
-            return Err(format!(
+            let message = format!(
                 "the cells of the far field are {coarsest_deg:.4}° wide, the photometer of {} {:.4}°; trace with cells of at most that",
                 self.id,
                 2.0 * half_deg
-            ));
+            );
+            return Err(Error::new(ErrorKind::CoarseCells, message));
         }
         Ok(Sensor { half_deg, round: sensor_round })
     }
@@ -50,7 +52,7 @@ impl Regulation {
     ///
     /// # Errors
     /// When the cells are coarser than the regulation's photometer; the message says how fine they must be.
-    pub fn check_cells(&self, coarsest_deg: f64) -> Result<(), String> {
+    pub fn check_cells(&self, coarsest_deg: f64) -> Result<(), Error> {
         self.sensor_for(coarsest_deg).map(|_| ())
     }
 }
@@ -60,11 +62,7 @@ impl Regulation {
 ///
 /// # Errors
 /// When the cells of the map are coarser than the regulation's photometer; the message says how fine they must be.
-pub fn assess(
-    map: &IntensityMap,
-    regulation: &Regulation,
-    assumptions: &Assumptions,
-) -> Result<Assessment, String> {
+pub fn assess(map: &IntensityMap, regulation: &Regulation, assumptions: &Assumptions) -> Result<Assessment, Error> {
     let rules = &regulation.rules;
     // The tables are written for right-hand traffic: the lamp is mirrored, not the tables.
     let mirrored = (assumptions.traffic == Traffic::Left).then(|| map.mirrored());
@@ -270,7 +268,9 @@ mod tests {
         assert_eq!((outside.unseen, row(&assessment, "75R").unseen), (1, 0));
         let coarse = IntensityMap::new(edges(10.0, 0.5), edges(10.0, 0.5), vec![[1.0, 0.0, 0.0]; 1600]).unwrap();
         let error = assess(&coarse, &regulation, &Assumptions::default()).unwrap_err();
-        assert!(error.contains("0.5000°") && error.contains("0.1490°"), "{error}");
+        assert_eq!(error.kind(), ErrorKind::CoarseCells);
+        let message = error.to_string();
+        assert!(message.contains("0.5000°") && message.contains("0.1490°"), "{message}");
     }
 
     #[test]

@@ -61,8 +61,10 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
     (
         "regulation",
         &[
+            "error",
             "row",
             "table",
+            "names",
             "cell_axis",
             "few_rays",
             "opening",

@@ -45,7 +45,7 @@ pub(crate) fn run(command: &AssessCommand, console: &Console) -> Result<Completi
         )
     })?;
     // A wrong name is said before anything is read.
-    let named = command.regulation.map(Regulation::find).transpose().map_err(Failure::arguments)?;
+    let named = command.regulation.map(Regulation::find).transpose()?;
     let run = ResultsFile::read(given)?;
     let regulation = match named {
         Some(regulation) => regulation,
@@ -60,7 +60,7 @@ pub(crate) fn run(command: &AssessCommand, console: &Console) -> Result<Completi
         tolerance_mm: run.tolerance_mm(),
     };
     let assessment = assess(&map, &regulation, &assumptions).map_err(|e| {
-        Failure::arguments(e).with_help("set `cells`, `h_deg` and `v_deg` of the far field and trace again")
+        Failure::from(e).with_help("set `cells`, `h_deg` and `v_deg` of the far field and trace again")
     })?;
     let document = assessment.document();
     if console.json {
@@ -128,7 +128,7 @@ impl ResultsFile {
         names.sort_unstable();
         names.dedup();
         let failure = match &names[..] {
-            [name] => return Regulation::find(name).map_err(Failure::arguments),
+            [name] => return Ok(Regulation::find(name)?),
             [] => Failure::arguments(format!("{}: judged by no regulation yet", self.path.display())),
             several => {
                 let judged = format!("{}: judged by {}", self.path.display(), several.join(", "));
@@ -162,8 +162,8 @@ impl ResultsFile {
         let rays = heaviest.zip(replicates);
         let rays = rays.map(|(heaviest_flux, replicates)| RaySample { heaviest_flux, replicates });
         let axis = |k: usize| Some([receiver["middle"][k].as_f64()?, receiver["half"][k].as_f64()?]);
-        let map =
-            IntensityMap::from_csv_over(&text, axis(0).zip(axis(1)).map(Into::into), rays).map_err(failure)?;
+        let map = IntensityMap::from_csv_over(&text, axis(0).zip(axis(1)).map(Into::into), rays)
+            .map_err(|e| failure(e.to_string()))?;
         // A run on facets writes what they change of every cell, unless the cells were too many to compare; one on the spline has none.
         Ok(if self.results["faceting"].is_null() { map.of_spline() } else { map })
     }

@@ -13,7 +13,7 @@ use serde_json::Value;
 /// # Errors
 /// When a far field cannot be judged.
 pub(super) fn say_verdicts(run: &SceneResults, prepared: &PreparedScene, console: &Console) -> Result<(), Failure> {
-    for verdict in run.verdicts(prepared).map_err(Failure::running)? {
+    for verdict in run.verdicts(prepared).map_err(|e| Failure::running(e.to_string()))? {
         console.say(summary(&verdict.assessment, console.width(), |text| console.bold(text)));
     }
     Ok(())

@@ -190,7 +190,7 @@ pub(crate) fn write(
     sequence_tables::add_ways(&mut document, &run.results, &prepared.job.loaded.model);
     face_tables::add_selectors(&mut document, &run.results, &prepared.job.loaded.model);
     document["provenance"] = json_value(&provenance)?;
-    let verdicts = run.verdicts(prepared).map_err(Failure::running)?;
+    let verdicts = run.verdicts(prepared).map_err(|e| Failure::running(e.to_string()))?;
     if !verdicts.is_empty() {
         document["regulations"] = verdicts.iter().map(|v| v.assessment.document()).collect();
     }

@@ -43,9 +43,9 @@ impl RegulationUse {
         };
         let regulation = match Regulation::find(&self.id) {
             Ok(regulation) => regulation,
-            Err(message) => {
+            Err(error) => {
                 let at = [Key::Name("regulation"), Key::Index(index), Key::Name("id")];
-                return Err(scene.error(ErrorKind::Value, &at, message));
+                return Err(scene.error(ErrorKind::Value, &at, error.to_string()));
             }
         };
         // However its name is written, and whether the only far field is named. Tables are read for names that may mean it alone.
@@ -81,10 +81,10 @@ impl RegulationUse {
         }
         let (h, v) = receiver.angles_deg();
         let [columns, rows] = receiver.cells.map(f64::from);
-        if let Err(message) = regulation.check_cells(f64::max((h[1] - h[0]) / columns, (v[1] - v[0]) / rows)) {
+        if let Err(error) = regulation.check_cells(f64::max((h[1] - h[0]) / columns, (v[1] - v[0]) / rows)) {
             let enough = |[from, to]: [f64; 2]| ((to - from) / regulation.coarsest_cells_deg()).ceil();
             let help = format!("`cells = [{}, {}]` are enough over these angles", enough(h), enough(v));
-            return fail("receiver", message, &help);
+            return fail("receiver", error.to_string(), &help);
         }
         Ok(())
     }
