@@ -26,40 +26,51 @@ fn fill_blank_numbers(text: &str) -> String {
     text.lines().enumerate().map(number).collect::<Vec<_>>().join("\n")
 }
 
+/// Returns the error of text that the `eulumdat` crate cannot read, at the line that its message names.
+fn parse_error(path: &Path, message: &str) -> Error {
+    let place = message.strip_prefix("Parse error at line ").and_then(|m| m.split_once(": "));
+    match place.and_then(|(line, said)| Some((line.parse::<usize>().ok()?, said))) {
+        // The crate counts lines from 0.
+        Some((line, said)) => Error::at_line(path, line + 1, format!("not EULUMDAT: {said}")),
+        None => Error::new(path, ErrorKind::Malformed(format!("not EULUMDAT: {message}"))),
+    }
+}
+
+/// Returns the C-planes that a file holds, degrees, in its order; for the plane C90–C270 it starts at C270.
+///
+/// # Errors
+/// When they do not fit the symmetry, in words.
+fn stored_planes(ldt: &Eulumdat) -> Result<Vec<f64>, &'static str> {
+    let count = ldt.intensities.len();
+    let stored: Vec<f64> = match ldt.symmetry {
+        Symmetry::VerticalAxis => vec![0.0],
+        Symmetry::PlaneC90C270 => {
+            let first = ldt.c_angles.iter().position(|c| (c - 270.0).abs() < SAME_ANGLE_DEG);
+            let first = first.ok_or("no C-plane is at 270°, where symmetry 3 begins")?;
+            // From −90 (C270) through C0 to C90, behind the last plane going on with the first.
+            let planes = ldt.c_angles.iter().cycle().skip(first).take(count);
+            planes.map(|&c| if c > 180.0 { c - 360.0 } else { c }).collect()
+        }
+        _ => ldt.c_angles.iter().copied().take(count).collect(),
+    };
+    if stored.len() != count || stored.iter().chain(&ldt.g_angles).any(|a| !a.is_finite()) {
+        return Err("the C-planes do not fit the symmetry the file states");
+    }
+    Ok(stored)
+}
+
 /// Reads EULUMDAT text; `path` is for messages alone.
 ///
 /// # Errors
 /// As [`read_eulumdat`].
 pub fn parse_eulumdat(path: &Path, text: &str) -> Result<Photometry, Error> {
     let malformed = |m: String| Error::new(path, ErrorKind::Malformed(m));
-    let ldt = Eulumdat::parse(&fill_blank_numbers(text)).map_err(|e| {
-        // The crate counts lines from 0.
-        let message = e.to_string();
-        let place = message.strip_prefix("Parse error at line ").and_then(|m| m.split_once(": "));
-        match place.and_then(|(line, said)| Some((line.parse::<usize>().ok()?, said))) {
-            Some((line, said)) => Error::at_line(path, line + 1, format!("not EULUMDAT: {said}")),
-            None => malformed(format!("not EULUMDAT: {message}")),
-        }
-    })?;
+    let ldt = Eulumdat::parse(&fill_blank_numbers(text)).map_err(|e| parse_error(path, &e.to_string()))?;
     let (n, rows) = (ldt.num_c_planes, ldt.g_angles.len());
     if n == 0 || rows < 2 || ldt.intensities.is_empty() {
         return Err(malformed("the file holds no intensities; check the numbers of C-planes and γ angles".into()));
     }
-    // The C-planes that the file holds, in its order; for the plane C90–C270 it starts at C270.
-    let stored: Vec<f64> = match ldt.symmetry {
-        Symmetry::VerticalAxis => vec![0.0],
-        Symmetry::PlaneC90C270 => {
-            let first = ldt.c_angles.iter().position(|c| (c - 270.0).abs() < SAME_ANGLE_DEG);
-            let first = first.ok_or_else(|| malformed("no C-plane is at 270°, where symmetry 3 begins".into()))?;
-            // From −90 (C270) through C0 to C90, behind the last plane going on with the first.
-            let planes = ldt.c_angles.iter().cycle().skip(first).take(ldt.intensities.len());
-            planes.map(|&c| if c > 180.0 { c - 360.0 } else { c }).collect()
-        }
-        _ => ldt.c_angles.iter().copied().take(ldt.intensities.len()).collect(),
-    };
-    if stored.len() != ldt.intensities.len() || stored.iter().chain(&ldt.g_angles).any(|a| !a.is_finite()) {
-        return Err(malformed("the C-planes do not fit the symmetry the file states".into()));
-    }
+    let stored = stored_planes(&ldt).map_err(|m| malformed(m.into()))?;
     let first = ldt.lamp_sets.first();
     if let Some(flux) = first.map(|s| s.total_luminous_flux).filter(|flux| *flux < 0.0) {
         return Err(malformed(format!("its lamps have a flux of {flux} lm, which must be zero or more")));
@@ -141,6 +152,15 @@ pub fn write_eulumdat(path: &Path, p: &Photometry) -> Result<(), Error> {
             "an intensity, angle, lumen, watt or length is no finite number; EULUMDAT holds none such",
         ));
     }
+    // The format ends lines as DOS does.
+    let text = eulumdat_of(p, &all).to_ldt().replace('\n', "\r\n");
+    write_atomic(path, |w| w.write_all(text.as_bytes()))
+}
+
+/// Returns photometry as the format has it; `all` are its intensities over the whole turn, or in the one plane of a rotational one.
+fn eulumdat_of(p: &Photometry, all: &Photometry) -> Eulumdat {
+    let rows = all.vertical_deg.len();
+    let rotational = all.horizontal_deg.len() == 1;
     // The last plane, at 360°, is the first one again.
     let planes = if rotational { 1 } else { all.horizontal_deg.len() - 1 };
     let lumens = p.lamp_lumens.unwrap_or_else(|| p.flux());
@@ -188,9 +208,7 @@ pub fn write_eulumdat(path: &Path, p: &Photometry) -> Result<(), Error> {
     ldt.g_angles = all.vertical_deg.clone();
     ldt.intensities =
         all.candela.chunks(rows).take(planes).map(|r| r.iter().map(|c| c * per_klm).collect()).collect();
-    // The format ends lines as DOS does.
-    let text = ldt.to_ldt().replace('\n', "\r\n");
-    write_atomic(path, |w| w.write_all(text.as_bytes()))
+    ldt
 }
 
 #[cfg(test)]

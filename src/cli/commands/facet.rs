@@ -107,13 +107,7 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
     let missing = made.report.missing_faces();
     let over = missing as f64 > command.limits.max_refused * placed as f64;
     if made.report.faces.failed > 0 {
-        let why = if missing == 0 { ", for they have no area: nothing is missing" } else { "" };
-        let message = format!("{} of {placed} faces got no facets{why}", made.report.faces.failed);
-        console.say_or_insist(over, message);
-        for face in made.report.failed.iter().take(NAMED_FAILURES) {
-            let entity = face.entity.map_or(format!("face {}", face.face), |id| format!("#{id}"));
-            console.say(format_args!("  {entity}: {}", face.cause));
-        }
+        say_failed_faces(&made.report, over, console);
     }
     Ok(refused.and(Completion::incomplete_if(over)))
 }
@@ -124,6 +118,18 @@ fn single_precision_beyond(mesh: &FacetMesh, tolerance_mm: f64) -> Option<f64> {
     // Half of the spacing along each axis.
     let moved = farthest.length() * f64::from(f32::EPSILON) / 2.0;
     (moved > tolerance_mm).then_some(moved)
+}
+
+/// Says how many faces got no facets, insisting where they are more than may be missing, and why the first of them got none.
+fn say_failed_faces(report: &Report, is_over_limit: bool, console: &Console) {
+    let failed = report.faces.failed;
+    let placed = report.faces.meshed + failed;
+    let why = if report.missing_faces() == 0 { ", for they have no area: nothing is missing" } else { "" };
+    console.say_or_insist(is_over_limit, format!("{failed} of {placed} faces got no facets{why}"));
+    for face in report.failed.iter().take(NAMED_FAILURES) {
+        let entity = face.entity.map_or(format!("face {}", face.face), |id| format!("#{id}"));
+        console.say(format_args!("  {entity}: {}", face.cause));
+    }
 }
 
 /// What truck-meshalgo makes of the same model; `facet --json` has it under `baseline`.
@@ -186,6 +192,39 @@ impl Baseline {
     }
 }
 
+/// Returns how far the facets lie from the surface: what is proved, and what was sampled.
+fn distance_text(r: &Report) -> String {
+    let of = if r.certified < r.facets { " on the certified ones" } else { "" };
+    let mut sag = format!("proved at most {} mm{of}", figures(r.sag_mm.bound_max, 4));
+    if let (Some(max), Some(mean)) = (r.sag_mm.sampled_max, r.sag_mm.sampled_mean) {
+        sag += &format!("; sampled: at most {} mm, mean {} mm", figures(max, 4), figures(mean, 3));
+    }
+    if let Some(over) = r.over_tolerance {
+        sag += &format!("; {} over the tolerance", count_of(over as u64, "facet"));
+    }
+    if r.unsampled > 0 {
+        let n = |x: usize| grouped(x as u64);
+        sag += &format!("; sampled on {} of {} facets", n(r.facets - r.unsampled), n(r.facets));
+    }
+    sag
+}
+
+/// Returns how many facets turn farther from the surface normals than the angle asked for; `None` where none was.
+fn angle_text(r: &Report) -> Option<String> {
+    let steep = r.over_angle.as_ref()?;
+    let count: usize = steep.iter().map(|s| s.facets).sum();
+    let largest = steep.iter().map(|s| s.largest_deg).fold(0.0, f64::max);
+    Some(match count {
+        0 => "kept by all facets".to_owned(),
+        _ => format!(
+            "{} of {} turn farther, at most {}°",
+            count_of(count as u64, "facet"),
+            count_of(steep.len() as u64, "face"),
+            figures(largest, 3)
+        ),
+    })
+}
+
 /// Returns the report of a meshing as lines for people.
 fn meshing_summary(r: &Report) -> String {
     let mut text = String::new();
@@ -200,18 +239,7 @@ fn meshing_summary(r: &Report) -> String {
         "certified",
         format!("{} of {} facets are proved to be within their tolerance", n(r.certified), n(r.facets)),
     );
-    let of = if r.certified < r.facets { " on the certified ones" } else { "" };
-    let mut sag = format!("proved at most {} mm{of}", figures(r.sag_mm.bound_max, 4));
-    if let (Some(max), Some(mean)) = (r.sag_mm.sampled_max, r.sag_mm.sampled_mean) {
-        sag += &format!("; sampled: at most {} mm, mean {} mm", figures(max, 4), figures(mean, 3));
-    }
-    if let Some(over) = r.over_tolerance {
-        sag += &format!("; {} over the tolerance", count_of(over as u64, "facet"));
-    }
-    if r.unsampled > 0 {
-        sag += &format!("; sampled on {} of {} facets", n(r.facets - r.unsampled), n(r.facets));
-    }
-    line("distance", sag);
+    line("distance", distance_text(r));
     if let Some(e) = r.normal_error_deg {
         line(
             "normals",
@@ -223,21 +251,8 @@ fn meshing_summary(r: &Report) -> String {
             ),
         );
     }
-    if let Some(steep) = &r.over_angle {
-        let count: usize = steep.iter().map(|s| s.facets).sum();
-        let largest = steep.iter().map(|s| s.largest_deg).fold(0.0, f64::max);
-        line(
-            "angle",
-            match count {
-                0 => "kept by all facets".to_owned(),
-                _ => format!(
-                    "{} of {} turn farther, at most {}°",
-                    count_of(count as u64, "facet"),
-                    count_of(steep.len() as u64, "face"),
-                    figures(largest, 3)
-                ),
-            },
-        );
+    if let Some(angle) = angle_text(r) {
+        line("angle", angle);
     }
     let volume = r.volume_mm3.map_or("open".to_owned(), |v| format!("{} mm³", figures(v, 6)));
     line("size", format!("area {} mm², volume {volume}", figures(r.area_mm2, 6)));

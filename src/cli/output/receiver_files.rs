@@ -152,16 +152,12 @@ fn sampled_rays(receiver: &ReceiverResult, sample: &SampledRays) -> Tm25 {
 const SOFTWARE: usize = 4;
 const ADDITIONAL: usize = 7;
 
-/// Returns a far field as LM-63 has it, in candela over all its directions, with the ends of both ranges: values there are those of the
-/// nearest cells, at a pole the mean of its ring, which `grid` has in all cells of the ring. `None` for other receivers, and where its
-/// ranges are not those of a whole luminaire.
-///
-/// A cell holds a mean, LM-63 values between which readers interpolate: all are scaled by one factor, within some thousandths of
-/// 1 and stated in the file, so that their flux is `lumens`.
-fn photometry(receiver: &ReceiverResult, grid: &Grid, lumens: f64) -> Option<Photometry> {
+/// Returns what LM-63 calls the angles of a far field, and the ranges of a whole luminaire, degrees, that its grid covers; `None` where it
+/// covers others.
+fn luminaire_range(angles: FarFieldType, grid: &Grid) -> Option<(PhotometricType, [[f64; 2]; 2])> {
     let half_turn = [-90.0, 90.0];
     // Light of a luminaire may go up or down alone (LM-63-2002, 5.11).
-    let (kind, wholes) = match receiver.angles? {
+    let (kind, wholes) = match angles {
         FarFieldType::A => (PhotometricType::A, vec![[half_turn; 2]]),
         FarFieldType::B => (PhotometricType::B, vec![[half_turn; 2]]),
         FarFieldType::C => {
@@ -173,6 +169,31 @@ fn photometry(receiver: &ReceiverResult, grid: &Grid, lumens: f64) -> Option<Pho
     let whole = wholes
         .into_iter()
         .find(|whole| (0..2).all(|k| (0..2).all(|e| near(grid.axes[k].range[e], whole[k][e]))))?;
+    Some((kind, whole))
+}
+
+/// Returns the keywords of the file of a luminaire, which has the name of its receiver.
+fn luminaire_keywords(name: &str) -> Vec<(String, String)> {
+    [
+        // LM-63-2002 requires these four in every file.
+        ("TEST", name),
+        ("TESTLAB", concat!("lampyris ", env!("CARGO_PKG_VERSION"), ", a simulation")),
+        ("ISSUEDATE", "see results.json"),
+        ("MANUFAC", "see results.json"),
+        ("LUMINAIRE", name),
+    ]
+    .map(|(key, value)| (key.to_owned(), printable_line(value).into_owned()))
+    .into()
+}
+
+/// Returns a far field as LM-63 has it, in candela over all its directions, with the ends of both ranges: values there are those of the
+/// nearest cells, at a pole the mean of its ring, which `grid` has in all cells of the ring. `None` for other receivers, and where its
+/// ranges are not those of a whole luminaire.
+///
+/// A cell holds a mean, LM-63 values between which readers interpolate: all are scaled by one factor, within some thousandths of
+/// 1 and stated in the file, so that their flux is `lumens`.
+fn photometry(receiver: &ReceiverResult, grid: &Grid, lumens: f64) -> Option<Photometry> {
+    let (kind, whole) = luminaire_range(receiver.angles?, grid)?;
     let [h, v] = &grid.axes;
     let ends = |k: usize, axis: &crate::formats::Axis| -> Vec<f64> {
         let middle = (0..axis.cells).map(|i| axis.center(i));
@@ -206,16 +227,7 @@ fn photometry(receiver: &ReceiverResult, grid: &Grid, lumens: f64) -> Option<Pho
         lamp_lumens: None,
         watts: 0.0,
         opening_mm: [0.0; 3],
-        // LM-63-2002 requires these four in every file.
-        keywords: [
-            ("TEST", receiver.name.as_str()),
-            ("TESTLAB", concat!("lampyris ", env!("CARGO_PKG_VERSION"), ", a simulation")),
-            ("ISSUEDATE", "see results.json"),
-            ("MANUFAC", "see results.json"),
-            ("LUMINAIRE", receiver.name.as_str()),
-        ]
-        .map(|(key, value)| (key.to_owned(), printable_line(value).into_owned()))
-        .into(),
+        keywords: luminaire_keywords(&receiver.name),
     };
     let factor = lumens / photometry.flux();
     // A dark far field has no flux to be scaled to.
