@@ -158,30 +158,9 @@ impl Results {
         let TracedRun { partial, cost, threads } = traced;
         let trace = partial.seconds;
         let mut tallies = partial.tallies;
-        // A run that was stopped early, or is one shard of many, answers for the rays it traced.
-        let traced = tallies.ends[0].total as f64 * plan.quantum;
-        let quantum = if traced > 0.0 && plan.grows() {
-            // From the sums alone, so that it does not matter which of its parts gave the size of the run.
-            plan.emitted / tallies.ends[0].total as f64
-        } else if traced > 0.0 {
-            plan.quantum * plan.emitted / traced
-        } else {
-            plan.quantum
-        };
+        let quantum = scaled_quantum(&plan, &tallies.ends[0]);
         let Counts { rays, segments, corrected_normals, lost, cut_off, caught, .. } = tallies.counts;
-        let bodies = bound.overlap_note(&tallies.counts).into_iter().chain(bound.repair_notes(&tallies.counts));
-        // In this order notes are read: what the scene says of itself, what the run found, what the errors are
-        // worth.
-        let found = bodies
-            .chain(bound.flush_sources_note(&tallies.counts, &plan, &partial.done))
-            .chain(bound.lost_note(lost, &tallies.ledger))
-            .chain(bound.scarce_sources_note(&plan))
-            .chain(bound.heavy_rays_note(&plan, &partial.done))
-            .chain(bound.short_lists_note(&plan, &partial.done))
-            .chain(bound.rounded_sources_note(&plan));
-        let found = found.chain(bound.uncounted_light_notes(&tallies.receivers));
-        let found = found.chain(cut_sequences_note(&tallies.sequences)).chain(few_replicates(tallies.replicates));
-        let mut notes: Vec<String> = bound.notes.iter().cloned().chain(found).collect();
+        let mut notes = notes_of_run(bound, &plan, &partial.done, &tallies);
         let scale = PowerScale { quantum, replicates: partial.done.len() as u32, rays };
         let receiver = |(i, r): (usize, &Receiver)| {
             ReceiverResult::new(r, i, &tallies, (&scale, plan.heaviest_ray()), bound.scene.run.unit)
@@ -231,6 +210,40 @@ impl Results {
     pub(crate) fn rounding(&self) -> f64 {
         HALF_QUANTUM * self.rays as f64 * self.quantum
     }
+}
+
+/// Returns the power of a quantum with which the sums of a run, or of a part of it, stand for the light of all sources; `emitted` is what
+/// left these.
+fn scaled_quantum(plan: &Plan, emitted: &Sum) -> f64 {
+    // A run that was stopped early, or is one shard of many, answers for the rays it traced.
+    let traced = emitted.total as f64 * plan.quantum;
+    if traced > 0.0 && plan.grows() {
+        // From the sums alone, so that it does not matter which of its parts gave the size of the run.
+        plan.emitted / emitted.total as f64
+    } else if traced > 0.0 {
+        plan.quantum * plan.emitted / traced
+    } else {
+        plan.quantum
+    }
+}
+
+/// Returns the notes of a run whose replicates `done` were traced.
+fn notes_of_run(bound: &BoundScene, plan: &Plan, done: &[u32], tallies: &Tallies) -> Vec<String> {
+    let counts = &tallies.counts;
+    // In this order notes are read: what the scene says of itself, what the run found, what the errors are worth.
+    let scene = bound.notes.iter().cloned();
+    let bodies = bound.overlap_note(counts).into_iter().chain(bound.repair_notes(counts));
+    let found = bodies
+        .chain(bound.flush_sources_note(counts, plan, done))
+        .chain(bound.lost_note(counts.lost, &tallies.ledger))
+        .chain(bound.scarce_sources_note(plan))
+        .chain(bound.heavy_rays_note(plan, done))
+        .chain(bound.short_lists_note(plan, done))
+        .chain(bound.rounded_sources_note(plan))
+        .chain(bound.uncounted_light_notes(&tallies.receivers))
+        .chain(cut_sequences_note(&tallies.sequences))
+        .chain(few_replicates(tallies.replicates));
+    scene.chain(found).collect()
 }
 
 /// Returns a table of sequences for each receiver; none where the scene does not ask for them.

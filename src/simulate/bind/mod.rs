@@ -119,17 +119,24 @@ impl Scene {
         bound.solids = (bound.emitters.len() >= MANY_SOURCES).then(|| bodies::solids(&bound, model, margin));
         bound.notes.extend(file_notes);
         bound.notes.extend(luminous_notes);
-        bound.notes.extend(notes::opening_note(&bound, model));
-        bound.notes.extend(notes::filled_void_note(&bound, model));
-        bound.notes.extend(notes::dark_far_field_note(&bound));
-        bound.notes.extend(notes::shut_body_note(&bound, &rules));
-        bound.notes.extend(notes::thin_body_note(&bound));
-        bound.notes.extend(notes::ready_mesh_note(model));
-        bound.notes.extend(doubled_solids::doubled_solid_notes(&bound, model));
-        bound.notes.extend(flush_receivers::flush_receiver_notes(&bound, model));
-        bound.notes.extend(overlapping_receivers::overlapping_receiver_notes(&bound));
+        bound.notes.extend(placement_notes(&bound, &rules, model));
         Ok(bound)
     }
+}
+
+/// Returns what a reader must know of the bodies and receivers of a scene and of how they lie to each other.
+fn placement_notes(bound: &BoundScene, rules: &[FaceRules], model: &Model) -> Vec<String> {
+    let mut found = Vec::new();
+    found.extend(notes::opening_note(bound, model));
+    found.extend(notes::filled_void_note(bound, model));
+    found.extend(notes::dark_far_field_note(bound));
+    found.extend(notes::shut_body_note(bound, rules));
+    found.extend(notes::thin_body_note(bound));
+    found.extend(notes::ready_mesh_note(model));
+    found.extend(doubled_solids::doubled_solid_notes(bound, model));
+    found.extend(flush_receivers::flush_receiver_notes(bound, model));
+    found.extend(overlapping_receivers::overlapping_receiver_notes(bound));
+    found
 }
 
 /// The faces of a model as light meets them.

@@ -20,7 +20,7 @@ mod stream;
 
 use super::body::Body;
 use super::far_angles::far_axes;
-use super::scene::{self, Scene, SourceKind};
+use super::scene::{self, Scene, Source, SourceKind};
 use super::surfaces::SceneLight;
 use super::{Error, ErrorKind};
 use crate::formats::{LightRay, PhotometricType};
@@ -93,23 +93,9 @@ impl Emitter {
     ) -> Result<Self, Error> {
         let s = &scene.sources[i];
         let (direction, at) = (Vector::from_array(s.direction), Point::from_array(s.at));
-        let mut shape = match (s.radius, s.size) {
-            (Some(r), _) => Shape::Disc(r),
-            (None, Some([a, b])) => Shape::Rectangle([0.5 * a, 0.5 * b]),
-            (None, None) => Shape::Point,
-        };
-        if let Some(area) = area {
-            shape = Shape::Faces(area);
-        }
+        let mut shape = drawn_shape(s, area);
         let mut frame = Frame::from_axis(at, direction, s.x.map(Vector::from_array));
-        let mut lobe = match s.kind {
-            SourceKind::Cone => Lobe::Cone(versine(s.half_angle_deg.unwrap_or(180.0).to_radians())),
-            SourceKind::Collimated => Lobe::Collimated,
-            SourceKind::Lambertian => Lobe::Cosine(LAMBERTIAN),
-            // The power that inverts cosⁿ is kept in place of n: one root or power a ray.
-            SourceKind::Cosine => Lobe::Cosine(1.0 / (s.exponent.unwrap_or(1.0) + 1.0)),
-            _ => Lobe::Cone(versine(PI)),
-        };
+        let mut lobe = lobe_of_kind(s);
         let mut own_power = 1.0;
         // Drawn where the scene gives no spectrum; without, by the rays' own wavelengths or the run's.
         let mut list_spectrum = None;
@@ -342,6 +328,28 @@ impl Emitter {
         };
         *ray = Ray::new(origin, self.direction(axes, || stream.pair(index, 1), sin_cos_turns));
         emission
+    }
+}
+
+/// Returns what the places of a source's rays are drawn from: the faces that it glows from (`area`), else a disc, a rectangle or a point.
+fn drawn_shape(source: &Source, area: Option<Area>) -> Shape {
+    match (area, source.radius, source.size) {
+        (Some(area), _, _) => Shape::Faces(area),
+        (None, Some(r), _) => Shape::Disc(r),
+        (None, None, Some([a, b])) => Shape::Rectangle([0.5 * a, 0.5 * b]),
+        (None, None, None) => Shape::Point,
+    }
+}
+
+/// Returns what the directions of a source's rays are drawn from; of a kind whose directions are in a file, all alike.
+fn lobe_of_kind(source: &Source) -> Lobe {
+    match source.kind {
+        SourceKind::Cone => Lobe::Cone(versine(source.half_angle_deg.unwrap_or(180.0).to_radians())),
+        SourceKind::Collimated => Lobe::Collimated,
+        SourceKind::Lambertian => Lobe::Cosine(LAMBERTIAN),
+        // The power that inverts cosⁿ is kept in place of n: one root or power a ray.
+        SourceKind::Cosine => Lobe::Cosine(1.0 / (source.exponent.unwrap_or(1.0) + 1.0)),
+        _ => Lobe::Cone(versine(PI)),
     }
 }
 

@@ -245,6 +245,22 @@ impl Receiver {
             .then_some(("channels", "absorbed flux is counted as power alone"))
     }
 
+    /// Returns what is wrong with the ranges of a far field's angles, and the key of the first that is wrong.
+    fn angle_fault(&self) -> Option<(&'static str, String)> {
+        let (h, v) = self.angles_deg();
+        let [h_range, v_range] = match self.angles {
+            // The elevation from the polar axis covers half a turn, the angle about it a whole one.
+            FarFieldType::A => [[-180.0, 180.0], [-90.0, 90.0]],
+            FarFieldType::B => [[-90.0, 90.0], [-180.0, 180.0]],
+            FarFieldType::C => [[0.0, 360.0], [0.0, 180.0]],
+        };
+        let is_within = |[from, to]: [f64; 2], [low, high]: [f64; 2]| low <= from && from < to && to <= high;
+        let ranges = [("h_deg", h, h_range), ("v_deg", v, v_range)];
+        let (key, _, [low, high]) = ranges.into_iter().find(|(_, given, range)| !is_within(*given, *range))?;
+        let kind = self.angles.letter();
+        Some((key, format!("`{key}` must rise and stay within {low} to {high}, the angles of type {kind}")))
+    }
+
     /// Refuses a receiver whose values contradict each other or the unit of the run, or leave it without a place or cells; `index` is its
     /// place in the scene.
     pub(super) fn check(&self, origin: &Origin, index: usize, unit: PowerUnit) -> Result<(), Error> {
@@ -290,33 +306,10 @@ impl Receiver {
                 Some(r) if LENGTHS_MM.contains(&r) => Ok(()),
                 _ => fail("radius", "a disc or sphere needs a `radius` from 1e-9 to 1e12"),
             },
-            ReceiverKind::FarField => {
-                let ([h0, h1], [v0, v1]) = self.angles_deg();
-                let (h, v) = match self.angles {
-                    // The elevation from the polar axis covers half a turn, the angle about it a whole one.
-                    FarFieldType::A => (180.0, 90.0),
-                    FarFieldType::B => (90.0, 180.0),
-                    FarFieldType::C => (360.0, 180.0),
-                };
-                let low = if self.angles == FarFieldType::C { [0.0, 0.0] } else { [-h, -v] };
-                let is_within =
-                    |[from, to]: [f64; 2], [low, high]: [f64; 2]| low <= from && from < to && to <= high;
-                let [h_range, v_range] = [[low[0], h], [low[1], v]];
-                let fault = |key: &'static str, [low, high]: [f64; 2]| {
-                    let kind = self.angles.letter();
-                    fail(
-                        key,
-                        &format!("`{key}` must rise and stay within {low} to {high}, the angles of type {kind}"),
-                    )
-                };
-                if !is_within([h0, h1], h_range) {
-                    return fault("h_deg", h_range);
-                }
-                if !is_within([v0, v1], v_range) {
-                    return fault("v_deg", v_range);
-                }
-                Ok(())
-            }
+            ReceiverKind::FarField => match self.angle_fault() {
+                Some((key, message)) => fail(key, &message),
+                None => Ok(()),
+            },
             ReceiverKind::Absorbed if self.part.is_none() && self.instance.is_none() && self.on.is_none() => {
                 fail("part", "say whose absorbed flux is meant: `part`, `instance` or `on`")
             }
