@@ -61,7 +61,6 @@ pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, String> {
     task.turn_sphere();
     let task = task;
     let chart = &task.chart;
-    let mut same_sense = task.same_sense != chart.flipped;
     let mut fits = task.fit_edges()?;
     task.keep_to_sheets(&mut fits)?;
     let mut gap = fits.values().fold(0f64, |g, f| g.max(f.gap));
@@ -75,17 +74,8 @@ pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, String> {
 
     // Loops in the unwrapped plane, then the boundary of a region without periods.
     let tolerance = task.accuracy.max(2.0 * gap).max(SMALLEST_ACCURACY);
-    let mut chains = chain_loops(&task, &fits, same_sense, tolerance);
-    if chart.has_two_normals {
-        let turned = chain_loops(&task, &fits, !same_sense, tolerance);
-        let misfits = |chains: &[Chain]| chains.iter().any(|c| c.is_winding() || c.is_against_sense);
-        // Of two normals the one is meant about which the outer loop has the face on its left; about the other one a loop through a pole
-        // goes around the rest of the surface, if it closes at all.
-        if misfits(&chains) && !misfits(&turned) || runs_clockwise(&chains) {
-            same_sense = !same_sense;
-            chains = turned;
-        }
-    }
+    let same_sense = task.same_sense != chart.flipped;
+    let (chains, same_sense) = chain_in_sense(&task, &fits, same_sense, tolerance);
     let bridged = bridged_step(&chains);
     let Boundary { mut loops, mut seams, repairs: turned } = bound_chains(&task, chains, bridged.as_deref())?;
     repairs.extend(bridged);
@@ -169,6 +159,28 @@ fn chain_loops(task: &FaceTask<'_>, fits: &FxHashMap<usize, Fit>, same_sense: bo
         chains.push(close_loop(pieces, &task.chart, tolerance));
     }
     chains
+}
+
+/// Chains the edges to loops, and returns whether the face has the normal of its surface: where the chart has two, not always as stated.
+fn chain_in_sense(
+    task: &FaceTask<'_>,
+    fits: &FxHashMap<usize, Fit>,
+    same_sense: bool,
+    tolerance: f64,
+) -> (Vec<Chain>, bool) {
+    let chains = chain_loops(task, fits, same_sense, tolerance);
+    if !task.chart.has_two_normals {
+        return (chains, same_sense);
+    }
+    let turned = chain_loops(task, fits, !same_sense, tolerance);
+    let misfits = |chains: &[Chain]| chains.iter().any(|c| c.is_winding() || c.is_against_sense);
+    // Of two normals the one is meant about which the outer loop has the face on its left; about the other one a loop through a pole
+    // goes around the rest of the surface, if it closes at all.
+    if misfits(&chains) && !misfits(&turned) || runs_clockwise(&chains) {
+        (turned, !same_sense)
+    } else {
+        (chains, same_sense)
+    }
 }
 
 /// Tells of the largest step between edges of loops that had to be bridged; `None` where all meet.

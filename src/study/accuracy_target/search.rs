@@ -89,24 +89,17 @@ pub fn meet_target_for_light(
         made: 0.0.into(),
         gave_up: false.into(),
     };
-    let local = target.kinds.iter().map(|&normals| search.candidate(normals, true));
-    // Where few rays meet the sharp places, they may err: one tolerance for all then costs less than holding every face to the angle.
-    // On the two reflectors 0.3° cost twice the cheapest combination without it.
-    let even =
-        target.kinds.iter().filter(|n| **n != NormalMode::Exact).map(|&normals| search.candidate(normals, false));
-    let mut kinds: Vec<Candidate> = local.chain(even).collect();
-    // The one that promises to be cheapest first: what it comes to may rule out the others.
-    kinds.sort_by(|a, b| a.work.total_cmp(&b.work));
+    let candidates = search.candidates();
     let mut trials: Vec<Trial> = Vec::new();
     let mut best: Option<Solution> = None;
-    for (k, candidate) in kinds.iter().enumerate() {
+    for (k, candidate) in candidates.iter().enumerate() {
         // A kind that is dearer by its own forecast than what another came to is not worth the wait.
         let beaten = best.as_ref().is_some_and(|b| b.is_kept(target) && candidate.work > 0.8 * b.work.total());
         if beaten {
             continue;
         }
         let stage = format!("{} normals", candidate.normals);
-        clock.report(&stage, 0.2 + 0.8 * k as f64 / kinds.len() as f64);
+        clock.report(&stage, 0.2 + 0.8 * k as f64 / candidates.len() as f64);
         // What cannot be meshed in reasonable time is tried, coarser, only while nothing else reaches the target.
         let is_open = best.as_ref().is_none_or(|b| !b.is_kept(target));
         let Some(found) = search.reach(candidate, is_open, &mut trials) else { continue };
@@ -219,6 +212,19 @@ impl Search<'_> {
         })
     }
 
+    /// Returns the candidates of all kinds of normals, with tolerances by place and with one for all places.
+    fn candidates(&self) -> Vec<Candidate> {
+        let kinds = &self.target.kinds;
+        let local = kinds.iter().map(|&normals| self.candidate(normals, true));
+        // Where few rays meet the sharp places, they may err: one tolerance for all then costs less than holding every face to the angle.
+        // On the two reflectors 0.3° cost twice the cheapest combination without it.
+        let even = kinds.iter().filter(|n| **n != NormalMode::Exact).map(|&normals| self.candidate(normals, false));
+        let mut candidates: Vec<Candidate> = local.chain(even).collect();
+        // The one that promises to be cheapest first: what it comes to may rule out the others.
+        candidates.sort_by(|a, b| a.work.total_cmp(&b.work));
+        candidates
+    }
+
     /// Makes the plan for these normals by the formulas, with one tolerance for all places unless `local`; meshes it, or a coarser one, and
     /// corrects it once by what pilots on those facets measure; forecasts the facets and the work of the job.
     fn candidate(&self, normals: NormalMode, local: bool) -> Candidate {
@@ -276,30 +282,11 @@ impl Search<'_> {
         }
         let mut best: Option<Solution> = None;
         for attempt in 0..ATTEMPTS {
-            let m = self.measure(&plan, normals, |facets, apart_mm| self.judge(facets, apart_mm));
-            self.made.set(self.made.get() + m.made.len() as f64);
-            // Both sets of rays must reach the target.
-            let worst =
-                |of: fn(&DirectionErrors) -> Option<f64>| m.errors.iter().filter_map(of).max_by(f64::total_cmp);
-            let reached = worst(DirectionErrors::percentile);
-            let (cost, seconds) = m.errors.iter().fold((Cost::default(), 0.0), |(mut cost, seconds), set| {
-                cost += set.cost;
-                (cost, seconds + set.seconds)
-            });
-            let facets = m.made.len();
-            let found = Solution {
-                normals,
-                plan: plan.clone(),
-                facets,
-                prepare: m.prepare,
-                trace: seconds / cost.rays.max(1) as f64 * self.target.job_rays,
-                work: JobWork::new(facets as f64, self.target.job_rays, normals, cost),
-                reached,
-                largest: worst(DirectionErrors::largest),
-                checked: m.errors.iter().map(|set| set.errors.len() as u64).sum(),
-                flat: m.errors.iter().map(|set| set.flat).sum(),
-                flips: m.errors.iter().map(|set| set.flips).sum(),
-            };
+            let measured = self.measure(&plan, normals, |facets, apart_mm| self.judge(facets, apart_mm));
+            let facets = measured.made.len();
+            self.made.set(self.made.get() + facets as f64);
+            let found = self.solution(plan.clone(), normals, &measured);
+            let reached = found.reached;
             trials.push(Trial {
                 normals: normals.name().into(),
                 tolerance_mm: plan.tolerance_mm(),
@@ -334,6 +321,36 @@ impl Search<'_> {
             plan.scale(growth);
         }
         best
+    }
+
+    /// Returns what facets of a plan came to on both sets of fresh rays.
+    fn solution(
+        &self,
+        plan: TolerancePlan,
+        normals: NormalMode,
+        measured: &Measured<[DirectionErrors; 2]>,
+    ) -> Solution {
+        let sets = &measured.errors;
+        // Both sets of rays must reach the target.
+        let worst = |of: fn(&DirectionErrors) -> Option<f64>| sets.iter().filter_map(of).max_by(f64::total_cmp);
+        let (cost, seconds) = sets.iter().fold((Cost::default(), 0.0), |(mut cost, seconds), set| {
+            cost += set.cost;
+            (cost, seconds + set.seconds)
+        });
+        let facets = measured.made.len();
+        Solution {
+            normals,
+            plan,
+            facets,
+            prepare: measured.prepare,
+            trace: seconds / cost.rays.max(1) as f64 * self.target.job_rays,
+            work: JobWork::new(facets as f64, self.target.job_rays, normals, cost),
+            reached: worst(DirectionErrors::percentile),
+            largest: worst(DirectionErrors::largest),
+            checked: sets.iter().map(|set| set.errors.len() as u64).sum(),
+            flat: sets.iter().map(|set| set.flat).sum(),
+            flips: sets.iter().map(|set| set.flips).sum(),
+        }
     }
 
     /// Returns what stands for a result when no candidate was measured: nothing known, no facets.
