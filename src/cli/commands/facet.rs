@@ -21,6 +21,7 @@ use crate::tessellate::{Report, sampled_sag};
 use crate::text::{count_of, figures, grouped};
 use crate::truck::baseline;
 use serde::Serialize;
+use std::path::Path;
 
 /// Faces without facets that are named with their cause; `--json` has all of them.
 const NAMED_FAILURES: usize = 10;
@@ -67,18 +68,7 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
         write_facets(path, &facets)?;
         spinner.finish_and_clear();
         console.say(format_args!("wrote {}", path.display()));
-        let finest = made.report.tolerance_mm.min;
-        if lower_extension(path) == "stl"
-            && let Some(moved) = single_precision_beyond(&made.mesh, finest)
-        {
-            console.say(format_args!(
-                "{}: STL has single precision, by which corners this far from the origin move by up to {} mm, more than the tolerance of {} mm; \
-                 .ply, .obj and .vtu keep them",
-                path.display(),
-                figures(moved, 2),
-                figures(finest, 4)
-            ));
-        }
+        say_rounding(path, &made.mesh, made.report.tolerance_mm.min, console);
     }
     let baseline = command.baseline.then(|| Baseline::run(&loaded.model, made.report.tolerance_mm.min));
     if console.json {
@@ -110,6 +100,21 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
         say_failed_faces(&made.report, over, console);
     }
     Ok(refused.and(Completion::incomplete_if(over)))
+}
+
+/// Says that corners in an STL file are rounded by more than the tolerance, mm, where they are.
+fn say_rounding(path: &Path, mesh: &FacetMesh, tolerance_mm: f64, console: &Console) {
+    if lower_extension(path) == "stl"
+        && let Some(moved) = single_precision_beyond(mesh, tolerance_mm)
+    {
+        console.say(format_args!(
+            "{}: STL has single precision, which moves corners this far from the origin by up to {} mm, more than the tolerance of {} mm; \
+             .ply, .obj and .vtu keep them",
+            path.display(),
+            figures(moved, 2),
+            figures(tolerance_mm, 4)
+        ));
+    }
 }
 
 /// Returns by how much rounding to single precision may move a corner, mm, where that is more than `tolerance_mm`.
