@@ -270,6 +270,13 @@ fn rules_that_do_not_fit_the_model_are_refused_with_advice() {
     let glass = format!("[[material]]\npart = '{part}'\nmedium = 'N-BK7'\n");
     for (text, says) in [
         (format!("[[material]]\npart = '{part}'\nsurface = 'interface'\n{REST}"), "no medium"),
+        // What an earlier rule made a mirror would let all light through.
+        (
+            format!(
+                "[[material]]\npart = '{part}'\nsurface = 'mirror'\n[[material]]\npart = '{part}'\nscatter = {{ share = 1 }}\n{REST}"
+            ),
+            "without `surface` an interface scatters",
+        ),
         (format!("[[material]]\nat = [1e5, 0, 0]\nmedium = 'N-BK7'\n{REST}"), "mm from the nearest face"),
         (format!("{glass}{REST}    inside = 'no such'\n"), "there are:"),
         (format!("{glass}[[receiver]]\nname = 'a'\nkind = 'absorbed'\npart = 'housing'\n{REST}"), "'housing'"),

@@ -96,7 +96,7 @@ fn surface_index(surfaces: &mut Vec<Surface>, surface: Surface) -> Option<u16> {
     u16::try_from(found).ok()
 }
 
-/// Checks that every face which its rule calls an interface has a medium behind it (`bodies`, by placed face).
+/// Checks that every face which its rule makes an interface, by name or by scatter alone, has a medium behind it (`bodies`, by placed face).
 ///
 /// # Errors
 /// For the first face that has none.
@@ -107,15 +107,24 @@ pub(super) fn check_interfaces(
     bodies: &[u32],
 ) -> Result<(), Error> {
     for ((f, FaceRules { surface: rule, .. }), &body) in model.placed_faces().zip(rules).zip(bodies) {
-        let Some(i) = rule.filter(|&r| scene.materials[r].surface == Some(SurfaceOptics::Interface)) else {
-            continue;
+        let Some(i) = rule.filter(|_| body == AMBIENT) else { continue };
+        let part = &model.part(f.part).name;
+        let error = |key, message, help: &str| {
+            let at = [Key::Name("material"), Key::Index(i), Key::Name(key)];
+            Err(scene.error(ErrorKind::Value, &at, message).help(help))
         };
-        if body == AMBIENT {
-            let at = [Key::Name("material"), Key::Index(i), Key::Name("surface")];
-            let part = &model.part(f.part).name;
-            let error =
-                scene.error(ErrorKind::Value, &at, format!("an interface of '{part}', which has no medium"));
-            return Err(error.help("add `medium` to this rule, or to another one for the part"));
+        match scene.materials[i].surface {
+            Some(SurfaceOptics::Interface) => {
+                let message = format!("an interface of '{part}', which has no medium");
+                return error("surface", message, "add `medium` to this rule, or to another one for the part");
+            }
+            // Scatter without a surface would let all light through, also where an earlier rule gave a mirror.
+            None => {
+                let message = format!("without `surface` an interface scatters, but '{part}' has no medium");
+                let help = "add the `surface` that scatters, such as \"mirror\", to this rule, or a `medium` to a rule for the part";
+                return error("scatter", message, help);
+            }
+            Some(_) => {}
         }
     }
     Ok(())
