@@ -105,6 +105,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "merge",
             "meta",
             "replay",
+            "study_options",
             "study",
             "dry_run",
             "ray_range",

@@ -56,3 +56,18 @@ fn a_file_that_a_study_does_not_use_is_refused() {
         assert!(code == 2 && err.contains("does not take no-such-file.stp"), "{code} {err}");
     }
 }
+
+/// A study of what is left of a damaged file says so, and is incomplete.
+#[test]
+fn what_was_not_read_of_a_model_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(fixture("step/lens_planoconvex_nurbs.stp")).unwrap();
+    let cut = folder.path().join("cut.stp").display().to_string();
+    std::fs::write(&cut, &text[..text.rfind("ENDSEC").unwrap()]).unwrap();
+    let results = folder.path().join("out").display().to_string();
+    for study in [&["study", "interpolation", "--rays", "1000"][..], &["study", "bvh", "--rays", "100"]] {
+        let (code, _, err) = lampyris(&[study, &["--no-report", "-o", &results, &cut]].concat());
+        assert!(code == 4 && err.contains("ends before its end section"), "{code} {err}");
+        assert!(folder.path().join("out/study.json").is_file(), "{err}");
+    }
+}

@@ -4,6 +4,7 @@
 
 use super::demo;
 use crate::cli::arguments::command::PlacedLimit;
+use crate::cli::completion::Completion;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::octree_shape::OctreeShape;
@@ -41,6 +42,8 @@ pub(crate) struct BvhBenchmark {
     pub(crate) rows: Vec<Value>,
     pub(crate) answer: String,
     pub(crate) shapes: Vec<OctreeShape>,
+    /// Whether all of the model was read.
+    pub(crate) completion: Completion,
 }
 
 /// Arguments of the benchmark.
@@ -76,7 +79,8 @@ pub(crate) fn run(
     let threads = threads::set_threads(command.tracing.threads)?;
     // A tolerance that is asked for is the only one.
     let tolerances = command.meshing.tolerance.map_or(TOLERANCES.to_vec(), |[finest, _]| vec![finest]);
-    let mut benchmark = BvhBenchmark { rows: Vec::new(), answer: String::new(), shapes: Vec::new() };
+    let completion = input_files::report_refusals(&loaded, 0.0, console);
+    let mut benchmark = BvhBenchmark { rows: Vec::new(), answer: String::new(), shapes: Vec::new(), completion };
     for (k, &tolerance) in tolerances.iter().enumerate() {
         let done = k as f64 / tolerances.len() as f64;
         progress(Progress { stage: format!("{tolerance} mm"), done, remaining_seconds: None });

@@ -18,6 +18,7 @@ mod meta;
 mod ray_range;
 mod replay;
 mod study;
+mod study_options;
 mod trace;
 mod trace_until;
 mod verdicts;
@@ -48,7 +49,7 @@ pub(super) fn execute(command: Command, console: &Console) -> Result<Completion,
         }
         Command::Check(command) => check::run(&command, console),
         Command::Study { kind, file, output, rays_in, embree, report, meshing, tracing } => {
-            let command = study::StudyCommand {
+            let command = study_options::StudyCommand {
                 kind,
                 file: file.as_deref(),
                 output: output.as_ref(),

@@ -2,7 +2,8 @@
 
 use super::bvh_benchmark::BvhCommand;
 use super::demo;
-use crate::cli::arguments::command::{PlacedLimit, ReportOption, StudyKind};
+use super::study_options::{StudyCommand, refuse_unused_options};
+use crate::cli::arguments::command::{PlacedLimit, StudyKind};
 use crate::cli::console::{Console, print, show_progress};
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::sentences::plain_sentence_lines;
@@ -21,8 +22,7 @@ use crate::intersect::exact::{
 use crate::intersect::octree::{self, Octree};
 use crate::model::Model;
 use crate::pipeline::{
-    IntersectorChoice, LoadedModel, MeshingSettings, TracingSettings, mesh_settings, refuse_facet_normals,
-    tessellate_model, with_intersector,
+    IntersectorChoice, LoadedModel, mesh_settings, refuse_facet_normals, tessellate_model, with_intersector,
 };
 use crate::report::{Section, View, study_report, tolerance_text};
 use crate::simulate::{RunSettings, Scene};
@@ -34,20 +34,6 @@ use crate::tessellate::tessellate;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-
-/// What `study` was asked for.
-pub(crate) struct StudyCommand<'a> {
-    pub(crate) kind: StudyKind,
-    pub(crate) file: Option<&'a Path>,
-    pub(crate) output: Option<&'a PathBuf>,
-    /// Rays to trace in place of those of the study; `None` for its own.
-    pub(crate) rays_in: Option<&'a Path>,
-    /// The library of Embree to compare with; `None` leaves Embree out.
-    pub(crate) embree: Option<&'a Path>,
-    pub(crate) report: ReportOption,
-    pub(crate) meshing: MeshingSettings,
-    pub(crate) tracing: TracingSettings,
-}
 
 /// Rays of a scene in the study of its accuracy: enough that the geometric error of a coarse mesh stands above the noise.
 const SCENE_RAYS: u64 = 200_000;
@@ -63,13 +49,20 @@ struct StudyResult {
     extra_rows: Vec<(&'static str, Value)>,
     /// The seed that a scene traced with; `None` for that of the command.
     seed: Option<u64>,
+    completion: Completion,
 }
 
 impl StudyResult {
     /// Makes the result of rows and the sentence about them; fails where rows have no form as JSON.
     fn new(rows: &impl Serialize, answer: impl Into<String>) -> Result<Self, Failure> {
         let rows = json_value(rows)?;
-        Ok(Self { rows, answer: answer.into(), extra_rows: Vec::new(), seed: None })
+        Ok(Self {
+            rows,
+            answer: answer.into(),
+            extra_rows: Vec::new(),
+            seed: None,
+            completion: Completion::Complete,
+        })
     }
 
     /// Adds a further table under a name of its own.
@@ -77,53 +70,11 @@ impl StudyResult {
         self.extra_rows.push((name, json_value(rows)?));
         Ok(self)
     }
-}
 
-/// Refuses options that a study would ignore: a user who gives one expects it to change the rows.
-fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
-    use StudyKind::{Accuracy, Bvh, Complexity, Effects, Stability};
-    let kind = command.kind;
-    if let Some(file) = command.file.filter(|_| matches!(kind, Complexity | Stability)) {
-        let reason = if kind == Stability { "its cases are built in" } else { "its three lamps are built in" };
-        let failure =
-            Failure::arguments(format!("study {} does not take {}: {reason}", kind.name(), file.display()));
-        return Err(
-            failure.with_help("leave it out; `lampyris study accuracy FILE` and `study bvh FILE` take a file")
-        );
+    /// Says what could not be read of the model; incomplete where that is any face.
+    fn about(self, loaded: &LoadedModel, console: &Console) -> Self {
+        Self { completion: input_files::report_refusals(loaded, 0.0, console), ..self }
     }
-    let m = &command.meshing;
-    let t = &command.tracing;
-    let traces_scene = kind == Effects;
-    // Studies of their own facets take a tolerance at most, the same on all faces.
-    let given = [
-        ("--intersector", t.intersector.is_some(), traces_scene, "it goes through all that it compares"),
-        ("--normals", t.normals.is_some(), traces_scene, "it goes through all that it compares"),
-        ("--rays", t.ray_range.is_some(), kind != Stability, "its rays are fixed"),
-        ("--seed", t.seed.is_some(), kind != Stability, "its rays are fixed"),
-        (
-            "--tolerance",
-            m.tolerance.is_some(),
-            matches!(kind, Effects | Accuracy | Bvh | Complexity),
-            "it goes through tolerances of its own",
-        ),
-        ("--angle", m.angle_deg.is_some(), traces_scene, "it makes facets of its own"),
-        ("--embree", command.embree.is_some(), kind == Bvh, "`study bvh` alone compares with Embree"),
-        ("--rays-in", command.rays_in.is_some(), kind == Bvh, "it traces rays of its own"),
-        (
-            "--rays",
-            t.ray_range.is_some() && command.rays_in.is_some(),
-            false,
-            "the file of --rays-in has all of them",
-        ),
-        ("--part", !m.part.is_empty(), traces_scene, "it makes facets of its own"),
-        ("--face", !m.face.is_empty(), traces_scene, "it makes facets of its own"),
-        ("--role", !m.role.is_empty(), traces_scene, "it makes facets of its own"),
-    ];
-    // Only the first is reported; the others would fail too.
-    let idle = given.iter().find(|(_, given, used, _)| *given && !used);
-    let Some((option, _, _, why)) = idle else { return Ok(()) };
-    let failure = Failure::arguments(format!("study {} does not take {option}: {why}", kind.name()));
-    Err(failure.with_help("leave it out"))
 }
 
 /// Runs a study and writes `study.json`, and the report if wanted, into its folder; prints the document, or its small tables and the
@@ -156,7 +107,8 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
             };
             let benchmark = super::bvh_benchmark::run(&benchmark, console, &progress)?;
             shapes = benchmark.shapes;
-            StudyResult::new(&benchmark.rows, benchmark.answer)?
+            let found = StudyResult::new(&benchmark.rows, benchmark.answer)?;
+            StudyResult { completion: benchmark.completion, ..found }
         }
         StudyKind::Effects => study_effects(command, threads, console, &progress)?,
     };
@@ -202,7 +154,7 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
         }
         console.say(format_args!("  {}", folder.join("study.json").display()));
     }
-    Ok(Completion::Complete)
+    Ok(found.completion)
 }
 
 /// Returns the model of the file or the built-in lamp, its scene if it has one, and a name for the rows.
@@ -238,7 +190,8 @@ fn study_accuracy(
     settings.rays = command.tracing.rays().unwrap_or(settings.rays);
     let Some(scene) = scene else {
         let study = accuracy::accuracy(&name, &product, &settings, progress);
-        return StudyResult::new(&study.rows, study.answer)?.with_rows("slopes", &study.slopes);
+        let found = StudyResult::new(&study.rows, study.answer)?.with_rows("slopes", &study.slopes)?;
+        return Ok(found.about(&loaded, console));
     };
     let bound = scene.bind(&loaded.model)?;
     let own = RunSettings::from(&scene.run);
@@ -247,7 +200,8 @@ fn study_accuracy(
     // Light needs no sag, and measuring takes as long as meshing.
     let plain = ModelMeshSource::new(&loaded.model);
     let (study, light) = study::scene_accuracy(&name, [&product, &plain], (&bound, &run), &settings, progress);
-    StudyResult::new(&study.rows, study.answer)?.with_rows("slopes", &study.slopes)?.with_rows("receivers", &light)
+    let found = StudyResult::new(&study.rows, study.answer)?;
+    Ok(found.with_rows("slopes", &study.slopes)?.with_rows("receivers", &light)?.about(&loaded, console))
 }
 
 /// Makes the section with a view of where on the surface the normals err, on facets of the tolerance asked for: reads and meshes the
@@ -277,18 +231,17 @@ fn study_interpolation(
     progress: Report,
 ) -> Result<StudyResult, Failure> {
     let (_, loaded, name) = read_model(command.file, console)?;
-    let mut models: Vec<(String, Model)> = vec![(name, loaded.model)];
     // Without a file all models that are built in, to show how the ratios vary.
-    if command.file.is_none() {
-        models.extend(study::lamp::lamps().into_iter().map(|l| (format!("{} lamp", l.name), l.model)));
-    }
+    let lamps = if command.file.is_none() { study::lamp::lamps() } else { Vec::new() };
+    let mut models: Vec<(String, &Model)> = vec![(name, &loaded.model)];
+    models.extend(lamps.iter().map(|l| (format!("{} lamp", l.name), &l.model)));
     let products: Vec<ModelMeshSource> = models.iter().map(|(_, m)| ModelMeshSource::new(m)).collect();
     let named: Vec<(&str, &dyn MeshSource)> =
         models.iter().zip(&products).map(|((n, _), p)| (n.as_str(), p as &dyn MeshSource)).collect();
     let mut settings = interpolation::Settings { seed, ..Default::default() };
     settings.rays = command.tracing.rays().unwrap_or(settings.rays);
     let study = interpolation::interpolation(&named, &settings, progress);
-    StudyResult::new(&study.rows, study.answer)
+    Ok(StudyResult::new(&study.rows, study.answer)?.about(&loaded, console))
 }
 
 /// Compares the spline, traced the traditional way and ours, with facets on three built-in lamps.
@@ -394,5 +347,6 @@ fn study_effects(
         with_intersector(choice, &loaded.model, &made.mesh, &TerminalMonitor::new(console), |intersector, _| {
             effects::effects(&name, (&bound, &run), intersector, EFFECT_ROUNDS, progress)
         });
-    Ok(StudyResult { seed: Some(run.seed), ..StudyResult::new(&rows, effects::answer(&rows))? })
+    let found = StudyResult::new(&rows, effects::answer(&rows))?.about(&loaded, console);
+    Ok(StudyResult { seed: Some(run.seed), ..found })
 }
