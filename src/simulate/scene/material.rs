@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 pub struct ModelUse {
     /// STEP file, relative to the scene file.
     pub file: String,
-    /// Put before the names of its instances, as `name/instance`, when several models are used.
+    /// Put before the names of its instances, as `name/instance`.
     pub name: String,
     /// Millimetres per length unit of the file, for files whose unit is wrong; the file's own unit otherwise.
     #[cfg_attr(feature = "schema", schemars(range(min = 1e-9, max = 1e6)))]
@@ -87,7 +87,8 @@ impl Default for Placement {
     }
 }
 
-/// What the faces that a rule selects are made of. All selectors that are given must hold; `*` in a name stands for anything.
+/// What the faces that a rule selects are made of. All selectors that are given must hold, each by one of its values where it is a list; `*`
+/// in a name stands for anything.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -107,7 +108,7 @@ pub struct Material {
     /// Kind of surface: `plane`, `cylinder`, `cone`, `sphere`, `torus`, `revolution`, `extrusion`, `offset`, `bspline`, `rational`,
     /// `tessellated` or `other`.
     pub kind: Option<OneOrMany<String>>,
-    /// Radius of a cylinder or sphere, or of a torus' tube, where it stands, mm; within 1e-4 of it.
+    /// Radius of a cylinder or sphere, or of a torus' tube, where it stands, mm; within a share of 1e-4.
     pub radius_mm: Option<OneOrMany<f64>>,
     /// `#id` of the face in the STEP file.
     pub entity: Option<OneOrMany<u64>>,
@@ -142,7 +143,8 @@ pub struct Material {
 pub struct ScatterKey {
     /// The lobe.
     pub lobe: LobeKind,
-    /// Share of the light that scatters; the rest stays specular. All of it unless said otherwise.
+    /// Share of the light that scatters; the rest stays specular. All of it unless said otherwise; of an ABg lobe, a factor of the share
+    /// that the lobe gives.
     #[cfg_attr(feature = "schema", schemars(range(min = 0, max = 1)))]
     pub share: Option<f64>,
     /// Standard deviation of a Gaussian lobe in each direction, degrees.
@@ -150,7 +152,7 @@ pub struct ScatterKey {
     /// Exponent of a cosine lobe about the specular direction.
     #[cfg_attr(feature = "schema", schemars(range(min = 0)))]
     pub exponent: Option<f64>,
-    /// `[A, B, g]` of an ABg lobe, which says itself how much it scatters.
+    /// `[A, B, g]` of an ABg lobe, which give the share that scatters too.
     pub abg: Option<[f64; 3]>,
 }
 

@@ -83,7 +83,7 @@ pub struct Scene {
     /// What parts and faces are made of; of several rules that meet on a face, the last one counts.
     #[serde(rename = "material")]
     pub materials: Vec<Material>,
-    /// What every other face is: `absorber` unless said otherwise.
+    /// What every other face is: `absorber` unless said otherwise. `coating` and `metal`, which need values, are for rules.
     pub default_surface: SurfaceOptics,
     /// Name of the medium around everything; vacuum unless said otherwise.
     pub ambient: Option<String>,

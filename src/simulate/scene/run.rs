@@ -65,7 +65,7 @@ pub struct Run {
     /// body absorbs nothing; `inf` for a guide that is wound up on itself.
     #[cfg_attr(feature = "schema", schemars(range(min = 1)))]
     pub caught_after: f64,
-    /// Length after which a path ends and counts as cut off, mm.
+    /// Length after which a path ends at the next face and counts as cut off, mm; its way from the last face on is not limited.
     pub max_length_mm: f64,
     /// Share of a ray's first power below which its path ends and counts as cut off.
     #[cfg_attr(feature = "schema", schemars(range(min = 0)))]
@@ -162,7 +162,8 @@ pub enum Interfaces {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Accuracy {
-    /// Smallest and largest sag of a facet, mm; one number for both.
+    /// Smallest and largest sag of a facet, mm; one number for both. Without any of `tolerance_mm`, `intersector` and `normals` a pilot
+    /// chooses all three.
     #[serde(deserialize_with = "lenient::range")]
     #[cfg_attr(feature = "schema", schemars(schema_with = "super::lenient::range_schema"))]
     pub tolerance_mm: Option<[f64; 2]>,

@@ -37,7 +37,8 @@ pub enum SolidKey {
     Name(String),
 }
 
-/// Faces of a model. All selectors that are given must hold; `*` in a name stands for anything.
+/// Faces of a model. All selectors that are given must hold, each by one of its values where it is a list; `*` in a name stands for
+/// anything.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -57,7 +58,7 @@ pub struct FaceSelector {
     /// Kind of surface: `plane`, `cylinder`, `cone`, `sphere`, `torus`, `revolution`, `extrusion`, `offset`, `bspline`, `rational`,
     /// `tessellated` or `other`.
     pub kind: Option<OneOrMany<String>>,
-    /// Radius of a cylinder or sphere, or of a torus' tube, where it stands, mm; within 1e-4 of it.
+    /// Radius of a cylinder or sphere, or of a torus' tube, where it stands, mm; within a share of 1e-4.
     pub radius_mm: Option<OneOrMany<f64>>,
     /// `#id` of the face in the STEP file.
     pub entity: Option<OneOrMany<u64>>,

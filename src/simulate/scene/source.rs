@@ -65,7 +65,8 @@ pub struct Source {
     /// Spectrum, in watts (in a run that counts lumens too: its light is then weighed by what the eye sees of it); the line
     /// `wavelength_nm` of the run unless said otherwise.
     pub spectrum: Option<SpectrumKey>,
-    /// Direction of the electric field of linearly polarised light, as far as each ray lets it; unpolarised without.
+    /// Direction of the electric field of linearly polarised light, as far as each ray lets it; unpolarised without. Needs `polarisation =
+    /// true` in `[run]`.
     pub polarised: Option<[f64; 3]>,
     /// Number of its rays, which `--rays` does not change; by its share of the power otherwise.
     #[serde(deserialize_with = "lenient::optional_count")]

@@ -19,10 +19,10 @@ pub struct SpectrumKey {
     pub kelvin: Option<f64>,
     /// Wavelengths a black body is cut to, nm; 360 to 830 unless said otherwise.
     pub range_nm: Option<[f64; 2]>,
-    /// Share of a white LED's power in the blue peak.
+    /// Share of a white LED's power in the blue peak; 0.22 unless said otherwise.
     #[cfg_attr(feature = "schema", schemars(range(min = 0, max = 1)))]
     pub blue_share: Option<f64>,
-    /// Peak of a white LED's phosphor, nm.
+    /// Peak of a white LED's phosphor, nm; 570 unless said otherwise.
     #[cfg_attr(feature = "schema", schemars(range(min = 380, max = 780)))]
     pub phosphor_nm: Option<f64>,
 }
