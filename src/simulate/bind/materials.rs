@@ -96,7 +96,8 @@ fn surface_index(surfaces: &mut Vec<Surface>, surface: Surface) -> Option<u16> {
     u16::try_from(found).ok()
 }
 
-/// Checks that every face which its rule makes an interface, by name or by scatter alone, has a medium behind it (`bodies`, by placed face).
+/// Checks that every face which its rule makes an interface, by name or by scatter alone, has a medium behind it (`bodies`, by placed
+/// face).
 ///
 /// # Errors
 /// For the first face that has none.
