@@ -87,8 +87,8 @@ impl Default for Placement {
     }
 }
 
-/// What the faces that a rule selects are made of. All selectors that are given must hold, each by one of its values where it is a list; `*`
-/// in a name stands for anything.
+/// What the faces that a rule selects are made of. All selectors that are given must hold, each by one of its values where it is a list;
+/// `*` in a name stands for anything.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
