@@ -318,7 +318,7 @@ pub(crate) struct TraceOptions {
 /// Whether a report is written.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 pub(crate) struct ReportOption {
-    /// Write no report.html, figures and tables: numbers alone
+    /// Write no report.html with its figures and tables
     #[arg(long, overrides_with = "report")]
     no_report: bool,
     /// Write report.html, figures and tables (the default)
