@@ -128,6 +128,30 @@ fn only_curved_facets_are_looked_for_behind_a_start() {
     assert!(hidden > 100, "{hidden}");
 }
 
+/// Light that begins between facets and spline, of a source or where it was scattered, in all directions.
+#[test]
+fn light_that_begins_within_the_sag_of_a_ball_comes_to_its_wall() {
+    let model = model([sphere(5.0)]);
+    let exact = Exact::build(&model, &Settings::default());
+    let mesh = mesh(&model, 0.2);
+    let octree = Octree::build(&mesh, &octree::Settings::default());
+    let polished = Polished::new(&octree, &mesh, &exact);
+    let mut s = Random(29);
+    for depth in [0.001, 0.01, 0.03, 0.1, 0.15] {
+        let rays: Vec<Ray> = (0..4000)
+            .map(|_| Ray::new(s.direction().normalize() * (5.0 - depth), s.direction().normalize()))
+            .collect();
+        let mut hits = vec![None; rays.len()];
+        polished.intersect_batch(&rays, &mut hits, &mut Cost::default());
+        for (ray, hit) in rays.iter().zip(&hits) {
+            // The chord of a sphere from a point within.
+            let along = ray.origin.dot(ray.direction);
+            let truth = (along * along + 25.0 - ray.origin.length_squared()).sqrt() - along;
+            assert!(hit.is_some_and(|h| (h.t - truth).abs() < 1e-7), "{depth}: {ray:?} {hit:?}, not {truth}");
+        }
+    }
+}
+
 /// A model with its facets, polished; its queries are counted by `ask`.
 fn with_polished<T>(model: &Model, tolerance: f64, ask: impl FnOnce(&Polished<'_>) -> T) -> T {
     let mesh = mesh(model, tolerance);

@@ -156,6 +156,11 @@ impl Slabs {
         })
     }
 
+    /// Whether a place lies in the slab of any facet.
+    pub(super) fn hold(&self, mesh: &FacetMesh, place: Point) -> bool {
+        self.tree.any_meeting(&Aabb::from_points([place]), |k| self.all[k as usize].meets(mesh, [place; 2]))
+    }
+
     /// How far from its facet, mm, a place may lie of which [`Self::meet`] speaks.
     #[inline(always)]
     pub(super) fn reach(&self) -> f64 {

@@ -26,7 +26,7 @@ pub(super) struct Start {
 
 impl Polished<'_> {
     /// How facets are asked about a ray; `None` for one that the spline must be asked about, as it is short, names no facet of its face,
-    /// leaves so flat that its next root may hide from the facets, or starts between another face and that one's facets.
+    /// leaves so flat that its next root may hide from the facets, or starts between a face and its facets.
     #[inline(always)]
     pub(super) fn start(&self, ray: &Ray, clear: &[ClearStart]) -> Option<Start> {
         let slack = 2.0 * self.sag;
@@ -37,7 +37,12 @@ impl Polished<'_> {
             if is_clear {
                 return Some(Start { slack: [0.0, slack], side: None });
             }
-            let is_near = self.curved.may_be_near(ray.point_at(ray.t_min));
+            let place = ray.point_at(ray.t_min);
+            let is_near = self.curved.may_be_near(place);
+            // Of what starts between a facet and the spline the way back may miss the facet, and light left a ball that it began in.
+            if is_near && self.slabs.hold(self.mesh, place) {
+                return None;
+            }
             let back = if is_near { slack } else { LOOK_BACK_OF_FLAT };
             return Some(Start { slack: [back, slack], side: None });
         };
