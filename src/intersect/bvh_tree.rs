@@ -48,7 +48,7 @@ impl Tree {
     }
 }
 
-/// A box as obvhs asks for it.
+/// A box as obvhs requires it.
 #[derive(Clone, Copy)]
 pub(super) struct Bounded(pub(super) Box32);
 

@@ -234,7 +234,7 @@ impl FacetRay {
         line.test_quad((facet, triangles), &along, best);
     }
 
-    /// How to ask the two triangles of the facet that the ray leaves: of these only the one it does not start on may be met, and only
+    /// How to test the two triangles of the facet that the ray leaves: of these only the one it does not start on may be met, and only
     /// where the fold between them closes on the ray.
     #[cold]
     fn tests_of_own(&self, corners: &[Point; 4], around: &Surroundings) -> [TriangleTest; 2] {
@@ -270,7 +270,7 @@ impl FacetRay {
         if own.second { [other, TriangleTest::Never] } else { [TriangleTest::Never, other] }
     }
 
-    /// How to ask a facet whose box holds the start within reach; `None` for all others, which are tested plainly.
+    /// How to test a facet whose box holds the start within reach; `None` for all others, which are tested plainly.
     #[inline(always)]
     fn tests_of_other(
         &self,

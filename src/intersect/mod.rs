@@ -89,7 +89,7 @@ impl<T: Intersector + ?Sized> Intersector for &T {
     }
 }
 
-/// Rays that are going to be asked.
+/// Rays that are going to be traced.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExpectedRays<'a> {
     /// How many, without those that start on a face.
@@ -164,7 +164,7 @@ pub enum Certainty {
 /// Work done, summed over rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
-    /// Rays asked.
+    /// Rays traced.
     pub rays: u64,
     /// Nodes of the structure visited.
     pub nodes: u64,
@@ -236,7 +236,7 @@ impl NormalMode {
     /// Every mode, the coarsest first.
     pub const ALL: [Self; 5] = [Self::Flat, Self::Nearest, Self::Bilinear, Self::Cubic, Self::Exact];
 
-    /// Returns the mode to ask facets with: `Bilinear` for `Exact`, as polishing replaces the facet's normal; any other mode itself.
+    /// Returns the mode to query facets with: `Bilinear` for `Exact`, as polishing replaces the facet's normal; any other mode itself.
     pub fn on_facets(self) -> Self {
         if self == Self::Exact { Self::Bilinear } else { self }
     }

@@ -1,4 +1,4 @@
-//! Asking for memory ahead of its use.
+//! Prefetching memory ahead of its use.
 //!
 //! Sound because the instruction is part of every x86-64, reads nothing and never faults, whatever the address.
 #![allow(unsafe_code)]
@@ -7,13 +7,13 @@
 /// Bytes of a cache line on every x86-64.
 const LINE: usize = 64;
 
-/// Asks for the cache lines of one element, without waiting; does nothing but on x86-64. An index out of bounds is harmless.
+/// Prefetches the cache lines of one element, without waiting; does nothing but on x86-64. An index out of bounds is harmless.
 #[inline(always)]
 pub(crate) fn prefetch<T>(slice: &[T], index: usize) {
     prefetch_range(slice, index, 1);
 }
 
-/// Asks for the cache lines of `count` elements from `first` on. A range out of bounds is harmless.
+/// Prefetches the cache lines of `count` elements from `first` on. A range out of bounds is harmless.
 #[inline(always)]
 pub(crate) fn prefetch_range<T>(slice: &[T], first: usize, count: usize) {
     #[cfg(target_arch = "x86_64")]
@@ -31,7 +31,7 @@ pub(crate) fn prefetch_range<T>(slice: &[T], first: usize, count: usize) {
     let _ = (slice, first, count);
 }
 
-/// Asks for so many cache lines from an address on, which may be any.
+/// Prefetches so many cache lines from an address on, which may be any.
 #[inline(always)]
 pub(crate) fn prefetch_lines<const LINES: usize>(start: *const u8) {
     #[cfg(target_arch = "x86_64")]
@@ -49,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn elements_smaller_than_a_cache_line_are_asked_for() {
+    fn elements_smaller_than_a_cache_line_are_prefetched() {
         let small = [1u8, 2, 3];
         let large = [[0u64; 32]; 2];
         // The index may be out of bounds: nothing is read.

@@ -1,6 +1,6 @@
 //! Which rays that leave a facet are known not to meet it again: all but those that graze one of its two triangles.
 //!
-//! One in three exact tests of a ray that refracts or reflects asked the facet that it had just left.
+//! One in three exact tests of a ray that refracts or reflects was of the facet that it had just left.
 
 use crate::math::{Point, Vector};
 use bytemuck::{AnyBitPattern, NoUninit};

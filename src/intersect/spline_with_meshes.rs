@@ -63,16 +63,16 @@ impl<'a> SplineWithMeshes<'a> {
 
     /// Answers at most [`BATCH`] rays: overwrites `hits` and counts each ray once.
     fn intersect_chunk(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
-        let mut asked: SmallVec<[Ray; BATCH]> = rays.iter().map(|ray| self.spline_ray(ray)).collect();
-        self.exact.intersect_batch(&asked, hits, cost);
-        for (asked, (ray, hit)) in asked.iter_mut().zip(rays.iter().zip(hits.iter())) {
-            *asked = self.mesh_ray(ray, hit.as_ref());
+        let mut queries: SmallVec<[Ray; BATCH]> = rays.iter().map(|ray| self.spline_ray(ray)).collect();
+        self.exact.intersect_batch(&queries, hits, cost);
+        for (query, (ray, hit)) in queries.iter_mut().zip(rays.iter().zip(hits.iter())) {
+            *query = self.mesh_ray(ray, hit.as_ref());
         }
         let mut on_meshes = [None; BATCH];
         let on_meshes = &mut on_meshes[..rays.len()];
         // However many structures were queried, it was one ray.
         let counted = cost.rays;
-        self.meshes.intersect_batch(&asked, on_meshes, cost);
+        self.meshes.intersect_batch(&queries, on_meshes, cost);
         cost.rays = counted;
         for (hit, on_mesh) in hits.iter_mut().zip(on_meshes) {
             let Some(found) = on_mesh else { continue };

@@ -8,7 +8,7 @@ const NUDGE: f64 = 1.0 / 1048576.0;
 pub(crate) const LONGEST_NUDGE: f64 = 1024.0;
 
 /// Height over the facet that it leaves to which the start of a grazing ray is lifted, in units of [`Surroundings::reach`]: 16 to 32 units
-/// in the last place of the largest coordinate, more than the rounding of a point computed on the facet, and of what asks where it lies.
+/// in the last place of the largest coordinate, more than the rounding of a point computed on the facet, and of the test for where it lies.
 pub(super) const LIFT: f64 = 1.0 / 256.0;
 
 /// The triangle of a facet on which a ray starts.

@@ -19,7 +19,7 @@ pub struct BinaryBvh<'m> {
     build_seconds: f64,
 }
 
-/// A triangle as the crate asks for it.
+/// A triangle as the crate requires it.
 struct Triangle {
     corners: [Point3<f64>; 3],
     code: TriangleCode,
@@ -67,12 +67,12 @@ impl Intersector for BinaryBvh<'_> {
         cost.rays += 1;
         let tree = self.tree.as_ref()?;
         let own = ray.departure.map(|d| d.primitive);
-        let asked = bvh::ray::Ray::new(point3(ray.origin), vector3(ray.direction));
+        let query = bvh::ray::Ray::new(point3(ray.origin), vector3(ray.direction));
         let mut nearest = None;
         let mut t_max = ray.t_max;
         // Triangles come by the distance at which their boxes are entered: those behind the nearest hit end the search.
-        for triangle in tree.nearest_traverse_iterator(&asked, &self.triangles) {
-            let entered = asked.intersection_slice_for_aabb(&triangle.aabb()).map(|(t, _)| t);
+        for triangle in tree.nearest_traverse_iterator(&query, &self.triangles) {
+            let entered = query.intersection_slice_for_aabb(&triangle.aabb()).map(|(t, _)| t);
             if entered.is_some_and(|t| t > t_max) {
                 break;
             }
@@ -82,11 +82,11 @@ impl Intersector for BinaryBvh<'_> {
             cost.tests += 1;
             let [a, b, c] = &triangle.corners;
             // The crate's test sees one side alone: from the other the corners come the other way around, and so do the weights.
-            let front = asked.intersects_triangle(a, b, c);
+            let front = query.intersects_triangle(a, b, c);
             let (found, weights) = if front.distance.is_finite() {
                 (front.distance, [front.u, front.v])
             } else {
-                let back = asked.intersects_triangle(a, c, b);
+                let back = query.intersects_triangle(a, c, b);
                 (back.distance, [back.v, back.u])
             };
             // A miss is reported as an infinite distance.

@@ -89,7 +89,7 @@ impl Intersector for Embree<'_> {
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
         cost.rays += 1;
         let begin = ray.t_min as f32;
-        let mut asked = RayHit {
+        let mut query = RayHit {
             origin: ray.origin.as_vec3().to_array(),
             direction: ray.direction.as_vec3().to_array(),
             t_near: if ray.departure.is_some() { begin.max(self.start_room) } else { begin },
@@ -99,12 +99,12 @@ impl Intersector for Embree<'_> {
             geometry: NO_GEOMETRY,
             ..RayHit::default()
         };
-        self.scene.intersect(&mut asked);
-        if asked.geometry == NO_GEOMETRY {
+        self.scene.intersect(&mut query);
+        if query.geometry == NO_GEOMETRY {
             return None;
         }
-        let (t, u, v) = (f64::from(asked.t_far), f64::from(asked.u), f64::from(asked.v));
-        let first = self.codes[asked.primitive as usize];
+        let (t, u, v) = (f64::from(query.t_far), f64::from(query.u), f64::from(query.v));
+        let first = self.codes[query.primitive as usize];
         let hit = match self.primitives {
             Primitives::Triangles => first.hit(t, [u, v]),
             // Embree's corners are our 1, 2, 3 and 0. On its first half, 1, 2 and 0, the weights are 1 − u − v, u and v; the second

@@ -88,7 +88,7 @@ pub struct EmbreeLibrary {
     device: Handle,
     release_device: Act,
     pub(super) intersect: Intersect1,
-    /// Bytes that Embree holds; the box stays where Embree was told it is.
+    /// Bytes that Embree holds; the box stays at the address that was passed to Embree.
     held: Box<AtomicIsize>,
     /// Never closed: Embree's worker threads run in it until the process ends.
     library: ManuallyDrop<Library>,
@@ -162,7 +162,7 @@ impl EmbreeLibrary {
         let unusable = |source| EmbreeError::Library { path: path.into(), source };
         let (kind, format) = if size == 3 { (TRIANGLES, UINT3) } else { (QUADS, UINT4) };
         // SAFETY: arguments as in `rtcore_scene.h` and `rtcore_geometry.h` of version 4. Both buffers are Embree's own, of the length
-        // asked for, and filled before the commit; all indices are below the number of positions.
+        // requested, and filled before the commit; all indices are below the number of positions.
         #[allow(unsafe_code)]
         unsafe {
             let new_scene: Symbol<NewObject> = self.library.get(b"rtcNewScene\0").map_err(unusable)?;

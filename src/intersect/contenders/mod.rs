@@ -1,4 +1,4 @@
-//! Hierarchies of other authors behind [`Intersector`](super::Intersector), for those who compare: each as it is shipped, asked one ray
+//! Hierarchies of other authors behind [`Intersector`](super::Intersector), for those who compare: each as it is shipped, traced one ray
 //! after the other, over the triangles of the facets.
 //!
 //! | | arithmetic | tree | of its own defects |

@@ -42,25 +42,25 @@ impl Intersector for Parry<'_> {
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
         cost.rays += 1;
         let own = ray.departure.map(|d| d.primitive);
-        let asked = Ray32::new(vector32(ray.origin), vector32(ray.direction));
+        let query = Ray32::new(vector32(ray.origin), vector32(ray.direction));
         // Beyond what `f32` holds a range is as good as endless.
         let t_max = if ray.t_max < f64::from(f32::MAX) { ray.t_max as f32 } else { f32::MAX };
         let t_min = ray.t_min as f32;
         let tests = Cell::new(0);
-        let nearest = self.tree.cast_ray(&asked, t_max, |index, nearest| {
+        let nearest = self.tree.cast_ray(&query, t_max, |index, nearest| {
             if own == Some(self.codes[index as usize].facet()) {
                 return None;
             }
             tests.set(tests.get() + 1);
             let [a, b, c] = self.triangles[index as usize];
-            let t = local_ray_intersection_with_triangle(a, b, c, &asked)?.0.time_of_impact;
+            let t = local_ray_intersection_with_triangle(a, b, c, &query)?.0.time_of_impact;
             (t >= t_min && t <= nearest).then_some(t)
         });
         // Of a miss too.
         cost.tests += tests.get();
         let (found, t) = nearest?;
         let [a, b, c] = self.triangles[found as usize];
-        let (_, weights) = local_ray_intersection_with_triangle(a, b, c, &asked)?;
+        let (_, weights) = local_ray_intersection_with_triangle(a, b, c, &query)?;
         let hit = self.codes[found as usize].hit(f64::from(t), [weights.y, weights.z].map(f64::from));
         Some(normals::describe(self.mesh, ray, &hit, NormalMode::default()))
     }

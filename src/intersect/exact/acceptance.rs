@@ -43,7 +43,7 @@ impl Exact {
             return;
         }
         let leaf_is_whole = self.linearizations[index as usize].whole;
-        // A leaf that no trim passes has nothing to ask: there every root in range is on the face.
+        // A leaf that no trim passes has nothing to test: there every root in range is on the face.
         let (inside, near_trim) = if leaf_is_whole { (true, false) } else { self.trim_side(query, leaf, local) };
         let counts = match &query.gap_start {
             Some(start) => self.counts_in_gap(query, start, &candidate, leaf, [inside, near_trim]),

@@ -1,4 +1,4 @@
-//! What a search has found, as a hit with its certificate, and the searches that callers ask for.
+//! What a search has found, as a hit with its certificate, and the searches that callers request.
 
 use super::leaf_test;
 use super::patch::{self, Patch};

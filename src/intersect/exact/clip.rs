@@ -54,7 +54,7 @@ enum Step {
     /// This way does not decide it: the next one is tried.
     Open,
     /// `f64` cannot decide: the leaf must be examined in 32 digits, and the roots it has offered be found again.
-    AskPrecise,
+    NeedsPrecise,
 }
 
 /// State of the clipping of a leaf.
@@ -125,7 +125,7 @@ impl Exact {
             leaf.has_pole && self.geometry.passes_pole(patch(), [query.o, query.d], CONTACT_LENGTH * leaf.contact);
         let clipping = Clipping { index, leaf, seen, departure, noise, at_pole };
         let before = [query.all.len(), query.all_rejected.len()];
-        if self.clip_seen(query, &clipping) == Step::AskPrecise {
+        if self.clip_seen(query, &clipping) == Step::NeedsPrecise {
             // In a search for all, what it found is found again.
             query.all.truncate(before[0]);
             query.all_rejected.truncate(before[1]);
@@ -148,7 +148,7 @@ impl Exact {
         self.clip_seen(query, &Clipping { index, seen, ..clipping });
     }
 
-    /// Looks for every root in what is seen of a leaf: [`Step::Done`] or [`Step::AskPrecise`].
+    /// Looks for every root in what is seen of a leaf: [`Step::Done`] or [`Step::NeedsPrecise`].
     #[inline(always)]
     fn clip_seen(&self, query: &mut Query, clipping: &Clipping<'_>) -> Step {
         let leaf = clipping.leaf;
@@ -172,7 +172,7 @@ impl Exact {
         let work = (net.len() * (usize::from(degree[0]) + usize::from(degree[1]))).div_ceil(BICUBIC_WORK) as u32;
         let near = range_along(&net).0;
         let mut node = Node { net, rect, near };
-        // Most leaves are done with the first box, and ask for no memory.
+        // Most leaves are done with the first box, and allocate no memory.
         let mut stack = Vec::new();
         loop {
             // Strict, so that a box that starts where the best root lies is not searched again.
@@ -182,8 +182,8 @@ impl Exact {
                 query.undecided_from = query.undecided_from.min(node.near);
             } else if !is_behind {
                 query.budget = query.budget.saturating_sub(work);
-                if self.clip_node(query, clipping, &node, &mut stack) == Step::AskPrecise {
-                    return Step::AskPrecise;
+                if self.clip_node(query, clipping, &node, &mut stack) == Step::NeedsPrecise {
+                    return Step::NeedsPrecise;
                 }
             }
             let Some(next) = stack.pop() else { return Step::Done };
@@ -191,7 +191,7 @@ impl Exact {
         }
     }
 
-    /// Takes one step: drops a box, offers its root, or puts what is left of it on the stack; [`Step::Done`] or [`Step::AskPrecise`].
+    /// Takes one step: drops a box, offers its root, or puts what is left of it on the stack; [`Step::Done`] or [`Step::NeedsPrecise`].
     #[inline(always)]
     fn clip_node(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node, stack: &mut Vec<Node>) -> Step {
         let (degree, seen) = (clipping.leaf.degree, clipping.seen);
@@ -319,7 +319,7 @@ impl Exact {
         Step::Done
     }
 
-    /// Offers the middle of a box that touches the ray within rounding, unless the ray leaves it; [`Step::AskPrecise`] where 32 digits
+    /// Offers the middle of a box that touches the ray within rounding, unless the ray leaves it; [`Step::NeedsPrecise`] where 32 digits
     /// may decide more.
     #[inline(always)]
     fn take_contact(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node) -> Step {
@@ -340,7 +340,7 @@ impl Exact {
             return Step::Done;
         }
         // A box that touches in `f64` may be long, and hold another root beside the one that the ray leaves.
-        if leaving && self.runs_along(query, clipping, node) { Step::Done } else { Step::AskPrecise }
+        if leaving && self.runs_along(query, clipping, node) { Step::Done } else { Step::NeedsPrecise }
     }
 
     /// Whether the ray, as far as a box reaches, runs along the surface that it leaves: nowhere higher over it than what its start is off

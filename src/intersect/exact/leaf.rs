@@ -19,7 +19,7 @@ const BEYOND_OF_DECIDING: f64 = 32.0;
 /// The part of a patch that is all of it, in the patch's local parameters.
 pub(super) const WHOLE_PATCH: [[f64; 2]; 2] = [[0.0, 1.0]; 2];
 /// A Jacobian whose determinant is a smaller part of the product of its row sums says nothing of which halving helps.
-const UNTOLD: f64 = 1e-9;
+const NEARLY_SINGULAR: f64 = 1e-9;
 
 /// A piece of a patch.
 #[derive(Clone, Debug)]
@@ -55,7 +55,7 @@ pub(super) struct Leaf {
     pub(super) rect: [[f64; 2]; 2],
 }
 
-/// Where a leaf's control points stand, for asking for them ahead of their use.
+/// Where a leaf's control points stand, for prefetching them ahead of their use.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NetPlace {
     /// Index of the first in [`Geometry::nets`].
@@ -280,7 +280,7 @@ pub(super) fn flattening_direction(leaf: &Leaf, slopes: &Slopes, net: &[V4], dep
     // Ties alternate, or a leaf of equal sides would be cut into strips.
     let alternate = depth as usize % 2;
     // Near a pole the inverse says nothing: the direction that bends more is halved.
-    if !(det.abs() > UNTOLD * (a.abs() + b.abs()) * (c.abs() + d.abs())) {
+    if !(det.abs() > NEARLY_SINGULAR * (a.abs() + b.abs()) * (c.abs() + d.abs())) {
         let square = |x: &V4| x.iter().map(|c| c * c).sum::<f64>();
         let nu = square(&uu);
         let nv = square(&vv);

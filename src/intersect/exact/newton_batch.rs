@@ -1,10 +1,10 @@
 //! Newton's method for many rays, eight at a time: each lane has a ray, a patch and a place of its own.
 //!
 //! A lane keeps to its patch and ends by the rules of [`Exact::converge`]; what leaves its patch, does not end soon or meets a singular
-//! point has no answer here, and its caller asks one by one. Grouped by the degree of their patches alone:
+//! point has no answer here, and its caller traces them one by one. Grouped by the degree of their patches alone:
 //! eight nets are transposed into registers at a tenth of the cost of the steps, so that neighbours need not lie on one patch.
 //!
-//! Guarantee: the answer of a ray is the same bits whatever rays it is asked with and whatever the instruction set.
+//! Guarantee: the answer of a ray is the same bits whatever rays it is traced with and whatever the instruction set.
 
 use super::geometry::Geometry;
 use super::net::{self, V4};
@@ -21,16 +21,16 @@ use crate::math::simd::f64x8::{Avx2Pair, Avx512Register};
 use crate::math::simd::{self, Instructions, Kernel};
 use crate::math::{Ray, Uv, Vector};
 
-/// Degrees above which rays are asked one by one.
+/// Degrees above which rays are traced one by one.
 const LARGEST_DEGREE: usize = 5;
 /// Control points of the largest net.
 const LARGEST_NET: usize = (LARGEST_DEGREE + 1) * (LARGEST_DEGREE + 1);
 /// Share of a patch by which a root may lie beyond its border, and is taken back to it: a hundredth of [`TANGENT`] on a patch of 10 mm.
 const BEYOND: f64 = 1e-12;
-/// Seeds ahead of which a patch is asked for, and the cell of a trim: a group is worked off in between.
+/// Seeds ahead of which a patch is prefetched, and the cell of a trim: a group is worked off in between.
 const PATCHES_AHEAD: usize = 24;
 const CELLS_AHEAD: usize = 12;
-/// Patches that stay in the cache of the first level without being asked for.
+/// Patches that stay in the cache of the first level without being prefetched.
 const FEW_PATCHES: usize = 32;
 /// Groups that are open at a time, one for each pair of degrees; with more the first is worked off early.
 const GROUPS: usize = 8;
@@ -111,7 +111,7 @@ impl Convergence<'_> {
                 }
                 self.points[index] = None;
                 let degree = self.geometry.patches[self.seeds[index].patch as usize].degree;
-                // The array of nets side by side has no room for these; rays on them are asked one by one.
+                // The array of nets side by side has no room for these; rays on them are traced one by one.
                 if usize::from(degree[0].max(degree[1])) > LARGEST_DEGREE {
                     continue;
                 }
@@ -122,8 +122,8 @@ impl Convergence<'_> {
         }
     }
 
-    /// Asks for what the seeds after the `index`-th need: first their patches, then the nets of these and the cells of trims in which they
-    /// begin and mostly end.
+    /// Prefetches what the seeds after the `index`-th need: first their patches, then the nets of these and the cells of trims in which
+    /// they begin and mostly end.
     #[inline(always)]
     fn fetch_ahead(&self, index: usize) {
         if let Some(seed) = self.seeds.get(index + PATCHES_AHEAD) {

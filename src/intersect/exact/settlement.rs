@@ -88,7 +88,7 @@ impl Exact {
         self.geometry.is_pole(patch, query.o + query.d * t, distance)
     }
 
-    /// Tells whether a root in 32 digits lies on the leaf that found it.
+    /// Returns whether a root in 32 digits lies on the leaf that found it.
     ///
     /// Over an inner border the surface goes on, and in its own numbers without a gap: de Boor's points of two spans agree on their knot to
     /// 30 digits. So a ray that meets the face meets it on a leaf by that leaf's own polynomial, and that leaf's test in `f64`, which

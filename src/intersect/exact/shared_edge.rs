@@ -1,4 +1,4 @@
-//! Which side of a shared edge a ray passes: one computation that both faces of the edge ask, so that a ray which crosses
+//! Which side of a shared edge a ray passes: one computation that both faces of the edge use, so that a ray which crosses
 //! a closed shell at an edge finds exactly one of them.
 //!
 //! The edges near a root are seen along the ray, as plane curves about the ray at the origin, and the nearest one decides: by

@@ -64,7 +64,7 @@ impl Settings {
     }
 }
 
-/// [`Settings::flatness`] for few rays, where building costs more than asking.
+/// [`Settings::flatness`] for few rays, where building costs more than tracing.
 const LOOSE_FLATNESS: f64 = 1.0;
 /// Halvings of a patch for few rays: with none a ray takes up to four times as long on nacelles and spheres, with two half as long again;
 /// and beside poles leaves stay as steep as they are however often they are halved.
@@ -175,7 +175,7 @@ impl Exact {
 fn subdivide(geometry: &Geometry, settings: &Settings) -> (PatchLeaves, bool) {
     let mut flatness = Flatness { deviation: settings.flatness, depth: settings.depth };
     let most = settings.most_leaves.unwrap_or(usize::MAX);
-    // A patch in two leaves is the least that flatness could ask for.
+    // A patch in two leaves is the least that flatness could require.
     let hopeless = geometry.patches.len().saturating_mul(2) > most;
     let cut = if hopeless { None } else { subdivision::subdivide_up_to(geometry, flatness, most) };
     let Some(mut cut) = cut else {
@@ -232,7 +232,7 @@ mod tests {
         use crate::math::Frame;
         let frame = Frame { origin: Point::new(0.1, 0.7, 1.3), ..Frame::IDENTITY };
         let plane = crate::nurbs::sweep::plane(&frame, [[0.0, 10.0]; 2]);
-        // Rational, and so flat that neither its bend nor its box asks for halves.
+        // Rational, and so flat that neither its bend nor its box requires halves.
         let tube = crate::nurbs::sweep::cylinder(&frame, 100.0, [0.0, 0.05], [0.0, 5.0]);
         for surface in [plane, tube] {
             let shells = vec![Shell { faces: vec![Face::whole(surface)], ..Shell::default() }];

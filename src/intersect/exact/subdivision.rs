@@ -217,7 +217,7 @@ impl Subdivision<'_> {
             let vain = if has_plane { 0 } else { vain + 1 };
             let deepest = depth >= self.flatness.depth || vain > VAIN_HALVINGS;
             let flat = self.is_flat(&described, area, deepest);
-            // The box of a slanted leaf is mostly empty and met by many rays in vain: a large one is halved beyond what flatness asks,
+            // The box of a slanted leaf is mostly empty and met by many rays in vain: a large one is halved beyond what flatness requires,
             // where that shrinks the boxes.
             let large = has_plane && area > LARGE * self.scene_area && depth < self.flatness.depth + BOX_HALVINGS;
             let tighter = if large { tightening_direction(&piece, degree, TIGHTER * area) } else { None };
@@ -226,7 +226,7 @@ impl Subdivision<'_> {
                     self.add_leaf(described, region, rect, &mut out);
                     continue;
                 }
-                // Flatness asks for nothing more: it is halved for its box alone, in the direction that tightens
+                // Flatness requires nothing more: it is halved for its box alone, in the direction that tightens
                 // it.
                 Some(direction) if flat || deepest => direction,
                 _ => flattening_direction(&described.leaf, &described.slopes, &described.net, depth),
@@ -262,7 +262,7 @@ impl Subdivision<'_> {
         leaf.patch = self.index;
         leaf.face = self.patch.face;
         let face = &self.geometry.faces[self.patch.face as usize];
-        // Only a leaf that a trim passes asks the shared edge which side a root lies on.
+        // Only for a leaf that a trim passes is the side of the shared edge evaluated on which a root lies.
         if !self.trim.whole && !part.leaf.whole {
             let border = border_sides(&self.geometry.grids[face.grid as usize], self.patch, rect);
             widen(&mut part, border, face.deciding_distance);

@@ -1,6 +1,6 @@
 //! The walk through the hierarchy, of one ray or of many at a time.
 //!
-//! In a batch a ray that has come to a leaf asks for its memory and lets the others go on meanwhile: on 10,000 patches, which no
+//! In a batch a ray that has come to a leaf prefetches its memory and lets the others go on meanwhile: on 10,000 patches, which no
 //! cache holds, waiting for memory took two fifths of the time of a ray by itself. Each ray takes the very steps that it takes
 //! alone, so the bits are the same.
 
@@ -168,11 +168,11 @@ impl Exact {
         self.push_root(&lane.query, &mut lane.stack);
     }
 
-    /// Walks to the next leaf, sets `lane.leaf` and asks for its memory; where none is left, for that of what names the hit.
+    /// Walks to the next leaf, sets `lane.leaf` and prefetches its memory; where none is left, for that of what names the hit.
     #[inline(always)]
     fn walk_to_leaf<I: Instructions>(&self, lane: &mut Lane) {
         lane.leaf = self.next_leaf::<I>(&mut lane.query, &mut lane.stack);
-        // Asked for now and read when the other lanes have had their turn.
+        // Prefetched now and read when the other lanes have had their turn.
         if let Some(leaf) = lane.leaf {
             prefetch(&self.linearizations, leaf as usize);
             let NetPlace { first, points } = self.net_places[leaf as usize];

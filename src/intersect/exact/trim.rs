@@ -289,7 +289,7 @@ impl Trim {
         self.cells[j * self.count[0] + i]
     }
 
-    /// Asks for the memory of the cell that holds `q`.
+    /// Prefetches the memory of the cell that holds `q`.
     #[inline(always)]
     pub(super) fn fetch_cell(&self, q: Uv) {
         let [i, j] = [0, 1].map(|d| *self.cell_range(q[d], q[d], d).start());

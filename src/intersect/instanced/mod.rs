@@ -21,7 +21,7 @@ use crate::model::{Instancing, Placement};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 use std::time::Instant;
-use walk::{OwnDeparture, Question, Walk, Workspace, leaving};
+use walk::{OwnDeparture, Query, Walk, Workspace, leaving};
 
 /// Rays that are under way at a time: with as many the structures of parts have enough to interleave, and their walks stay in the second
 /// cache.
@@ -91,21 +91,21 @@ impl<'a> Instanced<'a> {
         if self.has_single {
             work.local.clear();
             work.local.extend(walks.iter().map(|walk| walk.local_ray(None)));
-            let fell_back = self.ask_group(0, &work.local, hits, cost);
+            let fell_back = self.query_group(0, &work.local, hits, cost);
             walks.iter_mut().zip(hits.iter()).for_each(|(walk, hit)| walk.take(None, *hit));
             fell_back.iter().for_each(|&k| walks[k].fell_back = true);
         }
         // Light that leaves a surface mostly meets its own part next, and where no other stands in that one's box nothing can be nearer.
         open.clear();
         open.extend(0..rays.len());
-        self.ask(work, cost);
+        self.query_next(work, cost);
         work.walks[..rays.len()].iter_mut().for_each(|walk| self.enter_boxes(walk));
         loop {
             work.advance();
             if work.open.is_empty() {
                 break;
             }
-            self.ask(work, cost);
+            self.query_next(work, cost);
         }
         // A ray counts once, wherever it was traced.
         let walks = &work.walks[..rays.len()];
@@ -116,9 +116,9 @@ impl<'a> Instanced<'a> {
         }
     }
 
-    /// Asks rays in the coordinates of a group, overwrites `found`, adds to `cost`, and returns the indices of those on which the group
+    /// Traces rays in the coordinates of a group, overwrites `found`, adds to `cost`, and returns the indices of those on which the group
     /// fell back.
-    fn ask_group(
+    fn query_group(
         &self,
         group: usize,
         rays: &[Ray],
@@ -161,25 +161,25 @@ impl<'a> Instanced<'a> {
         self.groups[placement.group as usize].escapes(&placement.local_ray(&leaving(ray, departure, Some(place))))
     }
 
-    /// Asks the open walks at their next placement, those of one group together, and keeps the hits that are nearer; passes over walks
+    /// Traces the open walks at their next placement, those of one group together, and keeps the hits that are nearer; passes over walks
     /// without one.
-    fn ask(&self, work: &mut Workspace<'_>, cost: &mut Cost) {
-        let Workspace { walks, open, asked, local, found } = work;
-        let question = |&walk: &usize| {
+    fn query_next(&self, work: &mut Workspace<'_>, cost: &mut Cost) {
+        let Workspace { walks, open, queries, local, found } = work;
+        let next_query = |&walk: &usize| {
             let place = walks[walk].next?;
-            Some(Question { group: self.placement(place).group as usize, place, walk })
+            Some(Query { group: self.placement(place).group as usize, place, walk })
         };
-        asked.clear();
-        asked.extend(open.iter().filter_map(question));
-        asked.sort_by_key(|question| question.group);
-        for together in asked.chunk_by(|a, b| a.group == b.group) {
+        queries.clear();
+        queries.extend(open.iter().filter_map(next_query));
+        queries.sort_by_key(|query| query.group);
+        for together in queries.chunk_by(|a, b| a.group == b.group) {
             local.clear();
             local.extend(together.iter().map(|q| self.moved(&walks[q.walk], q.place)));
             found.clear();
             found.resize(local.len(), None);
-            let fell_back = self.ask_group(together[0].group, local, found, cost);
-            for (question, hit) in together.iter().zip(found.iter()) {
-                walks[question.walk].take(Some(question.place), *hit);
+            let fell_back = self.query_group(together[0].group, local, found, cost);
+            for (query, hit) in together.iter().zip(found.iter()) {
+                walks[query.walk].take(Some(query.place), *hit);
             }
             fell_back.iter().for_each(|&k| walks[together[k].walk].fell_back = true);
         }
@@ -190,7 +190,7 @@ impl<'a> Instanced<'a> {
         self.placement(place).local_ray(&walk.local_ray(Some(place)))
     }
 
-    /// Begins with the boxes that a ray may enter once it has been asked what it leaves; with none where it ends, at its hit or its range,
+    /// Begins with the boxes that a ray may enter once what it leaves has been queried; with none where it ends, at its hit or its range,
     /// inside the box of that placement and no other's meets this.
     fn enter_boxes(&self, walk: &mut Walk) {
         let Some(own) = walk.departure.and_then(|from| from.place).filter(|&k| self.is_alone(k, &walk.ray)) else {
@@ -328,14 +328,14 @@ mod tests {
         };
         let instancing = Instancing::new(&model, 0.0).unwrap();
         let ray = Ray::new(Point::new(-5.0, 0.0, 0.0), Vector::X);
-        let ask = |row: Option<f64>| {
+        let query = |row: Option<f64>| {
             let groups: Vec<Box<dyn Intersector>> = vec![Box::new(Scripted(Some(404.0))), Box::new(Scripted(row))];
             let mut cost = Cost::default();
             let hit = Instanced::new(&instancing, groups).intersect(&ray, &mut cost).unwrap();
             (hit.t, hit.certainty, cost.rays, cost.fallbacks)
         };
-        assert_eq!(ask(None), (404.0, Certainty::Uncertified, 1, 1));
-        assert_eq!(ask(Some(4.0)), (4.0, Certainty::Certified, 1, 0));
+        assert_eq!(query(None), (404.0, Certainty::Uncertified, 1, 1));
+        assert_eq!(query(Some(4.0)), (4.0, Certainty::Certified, 1, 0));
     }
 
     #[test]

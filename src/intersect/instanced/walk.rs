@@ -35,17 +35,17 @@ pub(super) struct Workspace<'t> {
     pub(super) walks: Few<Walk<'t>>,
     /// Indices of walks that have not ended.
     pub(super) open: Few<usize>,
-    pub(super) asked: Few<Question>,
+    pub(super) queries: Few<Query>,
     /// Rays in the coordinates of a group, and what they hit there.
     pub(super) local: Few<Ray>,
     pub(super) found: Few<Option<Hit>>,
 }
 
-/// A list that asks for no memory where a ray is alone.
+/// A list that allocates no memory where a ray is alone.
 type Few<T> = SmallVec<[T; 1]>;
 
 /// A ray that is traced in a placement.
-pub(super) struct Question {
+pub(super) struct Query {
     pub(super) group: usize,
     pub(super) place: u32,
     /// Index of the ray's walk.
@@ -65,7 +65,7 @@ impl<'t> Workspace<'t> {
         };
         let mut walks = Few::with_capacity(rays);
         walks.resize_with(rays, ended);
-        Self { walks, open: Few::new(), asked: Few::new(), local: Few::new(), found: Few::new() }
+        Self { walks, open: Few::new(), queries: Few::new(), local: Few::new(), found: Few::new() }
     }
 
     /// Takes the open walks to the next box that each enters before its hit, and drops from `open` those that have passed all.
@@ -122,7 +122,7 @@ impl Walk<'_> {
         leaving(&self.ray, self.departure, place)
     }
 
-    /// Its hit with the certainty that it has among all structures asked: a miss that is not proved may hide a nearer one.
+    /// Its hit with the certainty that it has among all structures queried: a miss that is not proved may hide a nearer one.
     pub(super) fn qualified(&self, hit: Hit) -> Hit {
         let is_doubtful = self.fell_back && hit.certainty == Certainty::Certified;
         Hit { certainty: if is_doubtful { Certainty::Uncertified } else { hit.certainty }, ..hit }

@@ -55,7 +55,7 @@ unsafe fn ordered(corner: __m256d, order: __m256i) -> __m256d {
 #[inline(always)]
 unsafe fn block_from_ray(block: &Block, ray: &SieveRay) -> __m128 {
     unsafe {
-        // In two parts: of a start far from the block one `f32` would lose the digits that tell the corners apart.
+        // In two parts: of a start far from the block one `f32` would lose the digits that distinguish the corners.
         let origin_and_step = std::ptr::from_ref(block).byte_add(offset_of!(Block, origin));
         let from_high = _mm_sub_ps(_mm_load_ps(origin_and_step.cast()), _mm_load_ps(ray.high.as_ptr()));
         _mm_sub_ps(from_high, _mm_load_ps(ray.low.as_ptr()))

@@ -1,5 +1,5 @@
 //! The walk of a batch: [`WIDTH`] rays are under way, and all steps of a kind are done in a row, without branches that depend on a ray:
-//! what the processor guesses wrong about a ray costs as much as a whole node. After a step the ray asks for the memory of its next one.
+//! what the processor guesses wrong about a ray costs as much as a whole node. After a step the memory of the ray's next one is prefetched.
 
 use super::facet_lanes::{FacetLanes, LANES, Verdict};
 use super::lanes::Lanes;
@@ -16,7 +16,7 @@ use crate::intersect::prefetch::prefetch;
 use crate::math::Ray;
 use std::mem::take;
 
-/// Rays before its start at which what a ray needs of the facet that it leaves is asked for; it itself as many before.
+/// Rays before its start at which what a ray needs of the facet that it leaves is prefetched; it itself as many before.
 const AHEAD: usize = 8;
 
 /// Rays under way.
@@ -53,7 +53,7 @@ pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
         cost.nodes += entering.count() as u64;
         let ways = enter_nodes::<L, STACK>(&arrays, states, entering, (&mut entries, &mut met));
         queues.put(entering, &ways);
-        // Here, not last: a ray that is started and at once asked for its first node waits until what was written of it has left the
+        // Here, not last: a ray that is started and whose first node is visited at once waits until what was written of it has left the
         // processor's store buffer, which took an eighth of the walk.
         let (mut started, mut ways) = (Rays::default(), Ways::default());
         for ray in take(&mut queues.end) {
@@ -76,7 +76,7 @@ pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
         let mut tests = 0;
         for ray in sifting {
             let s = &mut states[ray];
-            // The sieve knows rounded corners only; what it leaves asks for its true ones first.
+            // The sieve knows rounded corners only; the true ones of what it leaves are prefetched first.
             let (index, count) = (s.next.index(), s.next.facets());
             tests += count as u64;
             s.block = index as u32;
@@ -151,7 +151,7 @@ fn start_next<L: Lanes, const STACK: usize>(
     false
 }
 
-/// Asks for the memory of the corners of the facets that the sieve left, at least one; nearly always it is one.
+/// Prefetches the memory of the corners of the facets that the sieve left, at least one; nearly always it is one.
 #[inline(always)]
 fn prefetch_corners<const STACK: usize>(arrays: &Arrays, s: &RayState<STACK>) {
     let block = &arrays.blocks[s.block as usize];
@@ -168,8 +168,8 @@ fn prefetch_corners<const STACK: usize>(arrays: &Arrays, s: &RayState<STACK>) {
     }
 }
 
-/// Does the exact tests of rays that wait for one, eight at once, as long as others have something to do meanwhile, and tells the rays what
-/// is next.
+/// Does the exact tests of rays that wait for one, eight at once, as long as others have something to do meanwhile, and sets for the rays
+/// what is next.
 #[inline(always)]
 fn test_waiting<L: Lanes, const STACK: usize>(
     tree: &Tree,
@@ -215,7 +215,7 @@ fn test_in_lanes<const STACK: usize>(
     tested: Rays,
     lanes: &mut FacetLanes,
 ) {
-    let mut asked = [(0, 0); LANES];
+    let mut lane_facets = [(0, 0); LANES];
     for (lane, ray) in tested.enumerate().take(LANES) {
         let s = &mut states[ray];
         let block = &arrays.blocks[s.block as usize];
@@ -224,12 +224,12 @@ fn test_in_lanes<const STACK: usize>(
         let corners = block.positions[k].map(|p| arrays.positions[p as usize].as_ref());
         lanes.put(lane, (block.facets[k], triangles, corners), &s.facets, (s.departed, &s.best));
         s.candidates &= !(0x11 << k);
-        asked[lane] = (k, triangles);
+        lane_facets[lane] = (k, triangles);
     }
     lanes.test(tree.surroundings.reach);
     for (lane, ray) in tested.enumerate().take(LANES) {
         let s = &mut states[ray];
-        let (k, triangles) = asked[lane];
+        let (k, triangles) = lane_facets[lane];
         let block = &arrays.blocks[s.block as usize];
         let verdict = lanes.verdict(lane);
         if verdict & Verdict::CARE != 0 {

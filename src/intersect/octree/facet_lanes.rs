@@ -139,14 +139,14 @@ impl FacetLanes {
             let margin = margin(farthest, reach);
             let first = Signs::new([e1, diagonal, e0]);
             let second = Signs::new([e2, e3, -diagonal]);
-            let (asks_first, asks_second) = (self.triangles[l] & 1 != 0, self.triangles[l] & 2 != 0);
+            let (tests_first, tests_second) = (self.triangles[l] & 1 != 0, self.triangles[l] & 2 != 0);
             let misses_clearly =
-                (!asks_first | first.are_opposite(margin)) & (!asks_second | second.are_opposite(margin));
+                (!tests_first | first.are_opposite(margin)) & (!tests_second | second.are_opposite(margin));
             let by_start = ((self.departs[l] != 0) & near) | (self.is_own[l] != 0);
-            let meets_first = asks_first & first.are_one_sided();
-            let meets_second = asks_second & second.are_one_sided();
+            let meets_first = tests_first & first.are_one_sided();
+            let meets_second = tests_second & second.are_one_sided();
             let is_doubtful =
-                (asks_first & first.has_zero) | (asks_second & second.has_zero) | (meets_first & meets_second);
+                (tests_first & first.has_zero) | (tests_second & second.has_zero) | (meets_first & meets_second);
             let pick = |a: f64, b: f64| if meets_second { b } else { a };
             let [u, v, w] = [pick(e1, e2), pick(diagonal, e3), pick(e0, -diagonal)];
             let t = (u * z[0] + v * pick(z[1], z[2]) + w * pick(z[2], z[3])) * sz / (u + v + w);

@@ -162,7 +162,7 @@ fn open_into(cells: Vec<Cell>, places: usize, children: &mut Vec<Cell>) {
 }
 
 /// Returns the axis along which up to sixteen boxes lie farthest apart, and slots for them: those of the upper half along it, from eight
-/// on, and within each half by octant, so that [`Node::slot_order`] tells the order in which rays mostly meet them.
+/// on, and within each half by octant, so that [`Node::slot_order`] gives the order in which rays mostly meet them.
 fn slots(boxes: &[Box32]) -> (usize, Vec<usize>) {
     let middles: Vec<[f32; 3]> = boxes.iter().map(|b| std::array::from_fn(|a| b.low[a] + b.high[a])).collect();
     let spread = |axis: usize| {

@@ -1,4 +1,4 @@
-//! The adaptive octree: eight boxes while more than T facets meet a box, and only the boxes on the ray's path are asked.
+//! The adaptive octree: eight boxes while more than T facets meet a box, and only the boxes on the ray's path are visited.
 //!
 //! Cells are split at their middle while more than [`Settings::threshold`] facets meet them; facets are clipped exactly
 //! against the cells they meet. Under a leaf cell facets are packed by the surface-area heuristic into blocks of four
@@ -7,7 +7,7 @@
 //! an error bound, what a ray cannot hit; what remains is decided by the watertight f64 test of `intersect::facet`. Thirty-two rays of
 //! a batch are under way at a time; the steps of one kind are done in a row, each ray prefetching while the others compute.
 //!
-//! Where a run says beforehand which rays it will ask ([`Intersector::prepare_for`]), those of point and collimated sources are answered
+//! Where a run says beforehand which rays it will trace ([`Intersector::prepare_for`]), those of point and collimated sources are answered
 //! from a map of what the source sees, and rays that leave facets for which many do are known to be gone by the facet's horizon.
 //!
 //! Sources: the octree after Revelles, Ureña, Lastra, *An Efficient Parametric Algorithm for Octree Traversal*, WSCG

@@ -33,7 +33,7 @@ impl Link {
     const BLOCK: u32 = 2 << 30;
     /// The bits of an index with the number of facets below it.
     const PLACE: u32 = (1 << 30) - 1;
-    /// Blocks, and nodes, that links can tell apart.
+    /// Blocks, and nodes, that links can distinguish.
     pub(super) const MOST_BLOCKS: usize = 1 << 28;
     /// Of a slot that is not in use: no child is the node at the root.
     pub(super) const NONE: Self = Self(0);
@@ -82,7 +82,7 @@ impl Link {
         (self.0 >> 30) as usize
     }
 
-    /// The same link after its target moved up by so many nodes or blocks, whichever it is; not to be asked of [`Self::END`].
+    /// The same link after its target moved up by so many nodes or blocks, whichever it is; not defined for [`Self::END`].
     pub(super) fn moved(self, nodes: usize, blocks: usize) -> Self {
         Self(self.0 + ((if self.is_node() { nodes } else { blocks } as u32) << 2))
     }

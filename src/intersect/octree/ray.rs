@@ -123,7 +123,7 @@ impl SieveLimits {
     pub(super) fn new(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> Self {
         let mut to = [0.0; 4];
         for a in 0..3 {
-            // In two parts: of a start far from the block one `f32` would lose the digits that tell the corners apart.
+            // In two parts: of a start far from the block one `f32` would lose the digits that distinguish the corners.
             to[a] = (block.origin[a] - ray.high[a]) - ray.low[a];
         }
         let far = to[0].abs().max(to[1].abs()).max(to[2].abs());

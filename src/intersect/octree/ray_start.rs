@@ -34,7 +34,7 @@ pub(super) fn start(
     };
     let moved = moved(slack, shift);
     let mut octant = 0;
-    // Not the way to the mesh as a fourth: sieves ask for the largest.
+    // Not the way to the mesh as a fourth: sieves need the largest.
     (boxes.origin[3], boxes.inverse[3], boxes.slack[3]) = (0.0, 1.0, 0.0);
     (sieve.high[3], sieve.low[3]) = (0.0, 0.0);
     for a in 0..3 {
@@ -111,7 +111,7 @@ mod tests {
     }
 
     /// From inside, from a side, a corner and far off, along axes and past: all instruction sets say the same, and the way to the mesh
-    /// is no size of what a sieve asks for.
+    /// is no size of what a sieve needs.
     #[test]
     fn rays_start_alike_with_all_instructions() {
         let bounds = Aabb { min: Point::new(-3.0, 0.0, 5.0), max: Point::new(7.0, 2.0, 11.0) };

@@ -39,7 +39,7 @@ pub(super) fn start(
         let moved = moved(slack, shift);
         let from_center = _mm256_sub_pd(origin, _mm256_loadu_pd(mesh_box.center.as_ptr()));
         let exact = _mm256_add_pd(from_center, _mm256_mul_pd(direction, _mm256_set1_pd(shift)));
-        // Not the way to the mesh as a fourth: sieves ask for the largest.
+        // Not the way to the mesh as a fourth: sieves need the largest.
         let exact = _mm256_blend_pd::<8>(exact, _mm256_setzero_pd());
         let high = _mm256_cvtpd_ps(exact);
         let inverse = _mm256_cvtpd_ps(inverse);

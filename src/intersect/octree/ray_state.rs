@@ -61,7 +61,7 @@ impl<const STACK: usize> RayState<STACK> {
     }
 
     /// Puts a ray, in the mesh's coordinates, on its way and replaces the one before: next is `root`, or the end when it passes by the
-    /// whole mesh. `index` tells whose hit it will be. What differs from ray to ray within the mesh is chosen without branches.
+    /// whole mesh. `index` says whose hit it will be. What differs from ray to ray within the mesh is chosen without branches.
     #[inline(always)]
     pub(super) fn start<L: Lanes>(&mut self, tree: &Tree, root: Link, ray: &Ray, index: usize) {
         self.unmet_facet = tree.unmet_facet(ray);
@@ -82,7 +82,7 @@ impl<const STACK: usize> RayState<STACK> {
         self.shift = shift;
         let b = &mut self.boxes;
         b.t_min = (((ray.t_min - self.shift) * (1.0 - LIMIT_ROOM)) as f32).max(0.0);
-        // What is asked again is taken before it is written: what was written in parts is read as a whole only after a wait.
+        // What is read again is taken before it is written: what was written in parts is read as a whole only after a wait.
         let facets = FacetRay::new(ray);
         let (axes, shear) = (facets.axes(), facets.shear());
         self.departed = ray.departure.map_or(u32::MAX, |departure| departure.primitive);

@@ -62,7 +62,7 @@ impl Settings {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum InstructionSet {
-    /// The widest that the processor offers, asked at run time.
+    /// The widest that the processor offers, detected at run time.
     #[default]
     Fastest,
     /// AVX2 where the processor has it, else plain Rust.

@@ -57,7 +57,7 @@ pub(super) struct StepQueues {
     pub(super) node: Rays,
     /// To sift a block.
     pub(super) block: Rays,
-    /// To ask for the corners of facets that the sieve left.
+    /// To prefetch the corners of facets that the sieve left.
     pub(super) corners: Rays,
     /// To test them.
     pub(super) exact: Rays,

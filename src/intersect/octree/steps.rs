@@ -9,7 +9,7 @@ use crate::intersect::prefetch::prefetch_lines;
 use crate::math::Point;
 
 /// The arrays of a tree. Read once for many rays: that writing the state of a ray leaves where they lie as it was is more than a
-/// compiler can tell.
+/// compiler can infer.
 #[derive(Clone, Copy)]
 pub(super) struct Arrays<'t> {
     pub(super) nodes: &'t [Node],
@@ -50,7 +50,7 @@ fn used_lanes(count: usize) -> u32 {
     ((1 << count) - 1) * 0x11
 }
 
-/// Asks for the memory of a node or block, three lines of the cache each; at the end for the first node.
+/// Prefetches the memory of a node or block, three lines of the cache each; at the end for the first node.
 #[inline(always)]
 pub(super) fn prefetch_step(arrays: &Arrays, link: Link) {
     const { assert!(size_of::<Node>() == size_of::<Block>(), "one stride for both") };

@@ -34,7 +34,7 @@ impl<'m> Tree<'m> {
     /// Reads a tree of `mesh`, and its statistics.
     ///
     /// # Errors
-    /// When it cannot be read, or is no tree of this mesh, as [`TreeCheck`] tells. That its boxes hold the facets is not checked, nor the
+    /// When it cannot be read, or is no tree of this mesh, as [`TreeCheck`] finds. That its boxes hold the facets is not checked, nor the
     /// box around the mesh and the slopes: rays may miss facets then, but their walks come to each node and block once at most.
     pub(super) fn read_arrays(mesh: &'m FacetMesh, from: &mut ArrayReader) -> io::Result<(Self, Statistics)> {
         let (statistics, bounds) = read_head(from)?;

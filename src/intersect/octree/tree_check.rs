@@ -1,7 +1,7 @@
 //! Whether what was read is a tree of its mesh, in one pass over the nodes and one over the blocks.
 //!
 //! Guarantee: each node and block but the root hangs in one place, so that a walk comes to each once at most; levels, blocks and facets are
-//! as many as the statistics tell; what a link says that a block holds are facets of the mesh with their corners. Weakness: boxes and
+//! as many as the statistics say; what a link says that a block holds are facets of the mesh with their corners. Weakness: boxes and
 //! rounded corners, which only building anew would prove, may be false, and facets may be left out: hits are missed there.
 
 use super::Statistics;
@@ -25,12 +25,12 @@ pub(super) struct TreeCheck<'m> {
 }
 
 impl<'m> TreeCheck<'m> {
-    /// Begins with the root of a tree of as many nodes and blocks as it is told to have, for each of which a byte is set aside.
-    pub(super) fn new(mesh: &'m FacetMesh, root: Option<Link>, told: &Statistics) -> Self {
+    /// Begins with the root of a tree of as many nodes and blocks as it is said to have, for each of which a byte is set aside.
+    pub(super) fn new(mesh: &'m FacetMesh, root: Option<Link>, expected: &Statistics) -> Self {
         let mut check = Self {
             mesh,
-            levels: vec![0; told.nodes],
-            fills: vec![0; told.blocks],
+            levels: vec![0; expected.nodes],
+            fills: vec![0; expected.blocks],
             counted: Statistics::default(),
             blocks: 0,
             is_broken: false,
@@ -91,9 +91,9 @@ impl<'m> TreeCheck<'m> {
     }
 
     /// Whether all that was taken is a tree with these statistics; facets that were left out are not counted again.
-    pub(super) fn holds(self, told: &Statistics) -> bool {
-        let counted = Statistics { left_out: told.left_out, ..self.counted };
-        !self.is_broken && self.blocks == told.blocks && counted == *told
+    pub(super) fn holds(self, expected: &Statistics) -> bool {
+        let counted = Statistics { left_out: expected.left_out, ..self.counted };
+        !self.is_broken && self.blocks == expected.blocks && counted == *expected
     }
 }
 
@@ -150,22 +150,22 @@ mod tests {
         mesh: &FacetMesh,
         root: Option<Link>,
         (nodes, blocks): (&[Node], &[Block]),
-        told: &Statistics,
+        expected: &Statistics,
     ) -> bool {
-        let mut check = TreeCheck::new(mesh, root, told);
+        let mut check = TreeCheck::new(mesh, root, expected);
         // Where one part ends and the next begins does not count.
         nodes.chunks(3).for_each(|nodes| check.take_nodes(nodes));
         blocks.chunks(3).for_each(|blocks| check.take_blocks(blocks));
-        check.holds(told)
+        check.holds(expected)
     }
 
-    /// Whether the tree over a strip of a hundred squares is still held to be one after a change to it and to what is told of it.
+    /// Whether the tree over a strip of a hundred squares is still held to be one after a change to it and to its statistics.
     fn is_held_after(change: impl FnOnce(&mut Tree, &mut Statistics)) -> bool {
         let mesh = strip(100);
         let octree = Octree::build(&mesh, &Settings::textbook());
-        let (mut tree, mut told) = (octree.tree.clone(), octree.statistics().clone());
-        change(&mut tree, &mut told);
-        is_held(&mesh, tree.root, (&tree.nodes, &tree.blocks), &told)
+        let (mut tree, mut expected) = (octree.tree.clone(), octree.statistics().clone());
+        change(&mut tree, &mut expected);
+        is_held(&mesh, tree.root, (&tree.nodes, &tree.blocks), &expected)
     }
 
     fn is_block(link: Link) -> bool {
@@ -206,7 +206,7 @@ mod tests {
 
     /// Where all links of a node lead to the next one, a walk has sixteen times as many steps with each level.
     #[test]
-    fn what_hangs_in_several_places_is_told() {
+    fn what_hangs_in_several_places_is_detected() {
         // In place of another, so that there are as many links as before.
         assert!(!is_held_after(|tree, _| {
             let last = Link::node(tree.nodes.len() - 1);
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn links_that_lead_back_or_out_are_told() {
+    fn links_that_lead_back_or_out_are_detected() {
         for to in [Link::END, Link::node(1 << 20), Link::block(1 << 20, 1), Link::NONE] {
             assert!(!is_held_after(|tree, _| relink(tree, Link::is_node, to)), "{to:?}");
             assert!(!is_held_after(|tree, _| relink(tree, is_block, to)), "{to:?}");
@@ -251,42 +251,42 @@ mod tests {
     }
 
     #[test]
-    fn what_hangs_nowhere_or_holds_nothing_is_told() {
-        assert!(!is_held_after(|tree, told| {
+    fn what_hangs_nowhere_or_holds_nothing_is_detected() {
+        assert!(!is_held_after(|tree, expected| {
             tree.blocks.push(tree.blocks[0]);
-            told.blocks += 1;
+            expected.blocks += 1;
         }));
-        assert!(!is_held_after(|tree, told| {
+        assert!(!is_held_after(|tree, expected| {
             tree.nodes.push(tree.nodes[0]);
-            told.nodes += 1;
+            expected.nodes += 1;
         }));
-        assert!(!is_held_after(|tree, told| {
+        assert!(!is_held_after(|tree, expected| {
             let added = Link::node(tree.nodes.len());
             add_child(tree, 0, added);
             tree.nodes.push(Node::EMPTY);
-            told.nodes += 1;
+            expected.nodes += 1;
         }));
     }
 
     #[test]
-    fn statistics_of_another_tree_are_told() {
+    fn statistics_of_another_tree_are_detected() {
         let changes: [fn(&mut Statistics); 6] = [
-            |told| told.nodes += 1,
-            |told| told.blocks -= 1,
-            |told| told.references += 1,
-            |told| told.fill[0] += 1,
+            |expected| expected.nodes += 1,
+            |expected| expected.blocks -= 1,
+            |expected| expected.references += 1,
+            |expected| expected.fill[0] += 1,
             // Stacks for more levels than there are, and for fewer.
-            |told| told.depths.push(0),
-            |told| told.depths.truncate(1),
+            |expected| expected.depths.push(0),
+            |expected| expected.depths.truncate(1),
         ];
         for (k, change) in changes.into_iter().enumerate() {
-            assert!(!is_held_after(|_, told| change(told)), "{k}");
+            assert!(!is_held_after(|_, expected| change(expected)), "{k}");
         }
     }
 
     /// A chain of nodes, each with the next as its only child, over a block.
     #[test]
-    fn trees_deeper_than_stacks_are_told() {
+    fn trees_deeper_than_stacks_are_detected() {
         let mesh = strip(1);
         for (length, is_tree) in [(1, true), (DEEPEST, true), (DEEPEST + 1, false), (300, false)] {
             let node = |next: usize| {
@@ -296,9 +296,9 @@ mod tests {
             };
             let nodes: Vec<Node> = (1..=length).map(node).collect();
             let blocks = [Block::new(&mesh, Point::ZERO, &[0])];
-            let mut told = Statistics { nodes: length, ..Statistics::default() };
-            told.count_block(length as u32, 1);
-            assert_eq!(is_held(&mesh, Some(Link::node(0)), (&nodes, &blocks), &told), is_tree, "{length}");
+            let mut expected = Statistics { nodes: length, ..Statistics::default() };
+            expected.count_block(length as u32, 1);
+            assert_eq!(is_held(&mesh, Some(Link::node(0)), (&nodes, &blocks), &expected), is_tree, "{length}");
         }
     }
 
@@ -311,9 +311,9 @@ mod tests {
             let mut block = Block::new(&mesh, Point::ZERO, &[0, 1]);
             block.facets = facets;
             block.positions[1][3] = corner;
-            let mut told = Statistics::default();
-            told.count_block(0, count);
-            is_held(&mesh, Some(Link::block(0, count)), (&[], &[block]), &told)
+            let mut expected = Statistics::default();
+            expected.count_block(0, count);
+            is_held(&mesh, Some(Link::block(0, count)), (&[], &[block]), &expected)
         };
         // The second square has the corners 2, 4, 5 and 3 of six.
         assert!(is_block_held(2, [0, 1, NONE, NONE], 3));

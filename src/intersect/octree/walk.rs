@@ -39,7 +39,7 @@ fn idle_states<const STACK: usize>() -> Box<States<STACK>> {
     let states: Vec<RayState<STACK>> = (0..WIDTH).map(|_| RayState::idle()).collect();
     match states.try_into() {
         Ok(states) => states,
-        Err(_) => unreachable!("as many as asked for"),
+        Err(_) => unreachable!("as many as requested"),
     }
 }
 

@@ -1,8 +1,8 @@
-//! Polishing of many hits: facets are asked about all rays at once, and Newton's method takes its steps eight at a time.
+//! Polishing of many hits: all rays are traced on the facets at once, and Newton's method takes its steps eight at a time.
 //!
 //! What is plain is decided here: a start on the same side of facets and spline ([`super::start`]), a root near its facet hit, inside the
 //! trims and crossed the same way, and an answer that the closed shells do not contradict. Where that root is the point that the ray
-//! leaves, or lies before its range, the facets are asked about what is behind it. The spline is asked about all other rays, together.
+//! leaves, or lies before its range, the facets behind it are queried. All other rays are traced on the spline, together.
 
 use super::clear_start::ClearStart;
 use super::facet_naming::Probes;
@@ -16,18 +16,18 @@ use crate::math::Ray;
 use std::cell::RefCell;
 use std::sync::PoisonError;
 
-/// Rays that are asked together: their memory stays in a cache of the second level.
+/// Rays that are traced together: their memory stays in a cache of the second level.
 const BATCH: usize = 512;
-/// Rays ahead of which what is known of a facet is asked for.
+/// Rays ahead of which what is known of a facet is prefetched.
 const AHEAD: usize = 8;
 /// Facets whose roots lie behind a ray that it passes in the batch: more than one is rare.
 const MOST_BEHIND: usize = 3;
 /// Steps of Newton's method after which a search that goes from patch to patch is given up.
 const MOST_STEPS: u32 = 8;
 
-/// A ray of the batch that the facets are asked about.
+/// A ray of the batch that is to be traced on the facets.
 #[derive(Clone, Copy)]
-struct Asked {
+struct Pending {
     /// Its index in the batch.
     place: u32,
     /// To which side it leaves its surface, if any.
@@ -37,19 +37,19 @@ struct Asked {
 /// Memory of a batch.
 #[derive(Default)]
 struct Workspace {
-    /// What the facets are asked, and the ray that it comes from.
-    asked: Vec<Ray>,
-    of: Vec<Asked>,
-    /// Of each asked ray.
+    /// The rays as they are traced on the facets, and the ray of the batch that each comes from.
+    queries: Vec<Ray>,
+    pending: Vec<Pending>,
+    /// Of each query.
     facet_hits: Vec<Option<Hit>>,
     /// Of the facet hits that lie on a patch, and the point that each leads to.
     seeds: Vec<Seed>,
     points: Vec<Option<SurfacePoint>>,
-    /// The rays that passed a facet, from where on they ask again.
-    again: Vec<(Asked, Ray)>,
+    /// The rays that passed a facet, from where on they are traced again.
+    again: Vec<(Pending, Ray)>,
     /// The rays in doubt, by their index in the batch.
     doubtful: Vec<u32>,
-    /// What the spline is asked, and what it answers.
+    /// The rays that are traced on the spline, and their hits.
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
     probes: Probes,
@@ -62,9 +62,9 @@ thread_local! {
 /// What becomes of a ray in a batch.
 enum Decision {
     Answer(Option<Hit>),
-    /// The root of this facet hit is not ahead: the facets are asked again behind it.
+    /// The root of this facet hit is not ahead: the facets behind it are queried again.
     Behind,
-    /// In doubt: [`Polished::ask_truth`] decides.
+    /// In doubt: [`Polished::trace_spline`] decides.
     Doubt,
 }
 
@@ -78,18 +78,18 @@ impl Polished<'_> {
         for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
             self.sort_starts(rays, &clear, &mut space);
             for _ in 0..MOST_BEHIND {
-                if space.asked.is_empty() {
+                if space.queries.is_empty() {
                     break;
                 }
-                self.ask_facets(&mut space, cost);
+                self.trace_facets(&mut space, cost);
                 self.decide_all(rays, hits, &mut space, cost);
             }
-            let Workspace { of, doubtful, rays: asked, hits: found, probes, .. } = &mut space;
-            doubtful.extend(of.iter().map(|asked| asked.place));
-            asked.clear();
-            asked.extend(doubtful.iter().map(|&place| rays[place as usize]));
-            self.ask_truth(asked, found, cost);
-            self.name_facets(asked, found, probes, cost);
+            let Workspace { pending, doubtful, rays: open, hits: found, probes, .. } = &mut space;
+            doubtful.extend(pending.iter().map(|ray| ray.place));
+            open.clear();
+            open.extend(doubtful.iter().map(|&place| rays[place as usize]));
+            self.trace_spline(open, found, cost);
+            self.name_facets(open, found, probes, cost);
             for (&place, hit) in doubtful.iter().zip(found.iter()) {
                 hits[place as usize] = *hit;
             }
@@ -97,11 +97,11 @@ impl Polished<'_> {
         WORKSPACE.set(space);
     }
 
-    /// Sorts a batch: fills `space.asked` and `space.of` with the rays that the facets are asked about, their ranges widened by the slack,
-    /// and `space.doubtful` with all others.
+    /// Sorts a batch: fills `space.queries` and `space.pending` with the rays to be traced on the facets, their ranges widened by the
+    /// slack, and `space.doubtful` with all others.
     fn sort_starts(&self, rays: &[Ray], clear: &[ClearStart], space: &mut Workspace) {
-        space.asked.clear();
-        space.of.clear();
+        space.queries.clear();
+        space.pending.clear();
         space.doubtful.clear();
         for (i, ray) in rays.iter().enumerate() {
             // Of a ray that leaves no facet the first: a branch on whether it does would be guessed wrong.
@@ -112,22 +112,22 @@ impl Polished<'_> {
                 // A facet may lie before the range and its root in it: they are up to a sag apart across the facet,
                 // and more along a flat ray.
                 let [back, ahead] = start.slack;
-                space.asked.push(ray.with_range(ray.t_min - back, ray.t_max + ahead));
-                space.of.push(Asked { place: i as u32, side: start.side });
+                space.queries.push(ray.with_range(ray.t_min - back, ray.t_max + ahead));
+                space.pending.push(Pending { place: i as u32, side: start.side });
             } else {
                 space.doubtful.push(i as u32);
             }
         }
     }
 
-    /// Finds the facet hits of `space.asked`, seeds from them, and the roots that these converge to; rays are not counted.
-    fn ask_facets(&self, space: &mut Workspace, cost: &mut Cost) {
-        let Workspace { asked, facet_hits, seeds, points, .. } = space;
+    /// Finds the facet hits of `space.queries`, seeds from them, and the roots that these converge to; rays are not counted.
+    fn trace_facets(&self, space: &mut Workspace, cost: &mut Cost) {
+        let Workspace { queries, facet_hits, seeds, points, .. } = space;
         facet_hits.clear();
-        facet_hits.resize(asked.len(), None);
+        facet_hits.resize(queries.len(), None);
         let mut own = Cost::default();
-        self.facets.intersect_batch(asked, facet_hits, &mut own);
-        // A ray counts once, where it is answered, and not each time that facets are asked.
+        self.facets.intersect_batch(queries, facet_hits, &mut own);
+        // A ray counts once, where it is answered, and not each time that facets are queried.
         *cost += Cost { rays: 0, ..own };
         seeds.clear();
         for (k, hit) in facet_hits.iter().enumerate() {
@@ -142,41 +142,41 @@ impl Polished<'_> {
         }
         points.clear();
         points.resize(seeds.len(), None);
-        self.exact.converge_batch(asked, seeds, points);
+        self.exact.converge_batch(queries, seeds, points);
         // Most of the others have their root beside the patch, on the next one.
         for (seed, point) in seeds.iter().zip(points.iter_mut()).filter(|(_, point)| point.is_none()) {
             let facet = facet_hits[seed.ray as usize].map_or(0, |hit| hit.primitive);
             let face = self.records[facet as usize].face;
-            *point = self.exact.converge(&asked[seed.ray as usize], face, seed.uv, MOST_STEPS);
+            *point = self.exact.converge(&queries[seed.ray as usize], face, seed.uv, MOST_STEPS);
         }
     }
 
-    /// Decides about all rays that were asked, and writes the `hits` of those that are plain. Those that ask again, from behind the facet
-    /// they passed, are left in `space.asked` and `space.of`; those in doubt are added to `space.doubtful`.
+    /// Decides about all rays that were traced, and writes the `hits` of those that are plain. Those to be traced again, from behind the
+    /// facet they passed, are left in `space.queries` and `space.pending`; those in doubt are added to `space.doubtful`.
     fn decide_all(&self, rays: &[Ray], hits: &mut [Option<Hit>], space: &mut Workspace, cost: &mut Cost) {
-        let Workspace { asked, of, facet_hits, seeds, points, again, doubtful, .. } = space;
+        let Workspace { queries, pending, facet_hits, seeds, points, again, doubtful, .. } = space;
         again.clear();
         let mut found = seeds.iter().zip(points.iter()).peekable();
-        for (k, (&of, facet_hit)) in of.iter().zip(facet_hits.iter()).enumerate() {
+        for (k, (&pending_ray, facet_hit)) in pending.iter().zip(facet_hits.iter()).enumerate() {
             let point = found.next_if(|(seed, _)| seed.ray == k as u32).and_then(|(_, point)| point.as_ref());
-            let place = of.place as usize;
-            match (self.decide(&rays[place], of.side, facet_hit.as_ref(), point), facet_hit) {
+            let place = pending_ray.place as usize;
+            match (self.decide(&rays[place], pending_ray.side, facet_hit.as_ref(), point), facet_hit) {
                 (Decision::Answer(answer), _) => {
                     cost.rays += 1;
                     hits[place] = answer;
                 }
                 (Decision::Behind, Some(passed)) => {
                     // Just past the facet, or it would be found again.
-                    again.push((of, asked[k].with_range(passed.t.next_up(), asked[k].t_max)));
+                    again.push((pending_ray, queries[k].with_range(passed.t.next_up(), queries[k].t_max)));
                 }
-                _ => doubtful.push(of.place),
+                _ => doubtful.push(pending_ray.place),
             }
         }
-        asked.clear();
-        of.clear();
-        for (of_ray, ray) in again.drain(..) {
-            asked.push(ray);
-            of.push(of_ray);
+        queries.clear();
+        pending.clear();
+        for (pending_ray, ray) in again.drain(..) {
+            queries.push(ray);
+            pending.push(pending_ray);
         }
     }
 
@@ -227,10 +227,10 @@ impl Polished<'_> {
         // And so may one between another face and that one's facets, or behind both: the facet was met before the other's, and its root
         // may come after.
         let way = [ray.point_at(facet_hit.t), ray.point_at(point.t)];
-        // Nearly all roots are so near to their facet hit that nothing else needs be asked.
-        let is_told = (point.t - facet_hit.t).abs() <= self.slabs.reach()
-            || self.is_told(facet_hit.primitive, point.uv, way[1]);
-        if is_doubtful || !is_told || self.slabs.meet(self.mesh, facet_hit.primitive, way) {
+        // Nearly all roots are so near to their facet hit that nothing else needs to be tested.
+        let is_covered = (point.t - facet_hit.t).abs() <= self.slabs.reach()
+            || self.is_covered(facet_hit.primitive, point.uv, way[1]);
+        if is_doubtful || !is_covered || self.slabs.meet(self.mesh, facet_hit.primitive, way) {
             return Decision::Doubt;
         }
         Decision::Answer(Some(Hit {

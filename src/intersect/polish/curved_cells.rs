@@ -2,7 +2,7 @@
 //!
 //! A facet behind the start may stand for a piece of spline ahead of it, but only where it is curved, as a flat one lies on the spline.
 //! Chips, boards and windows are flat, and light starts a hundredth of a millimetre over them: each of its rays found the chip behind it,
-//! and asked the facets a second time.
+//! and was traced on the facets a second time.
 
 use super::facet_record::FacetRecord;
 use super::limits::LEAST_SLACK_SINE;
@@ -40,10 +40,10 @@ impl CurvedCells {
         let mut marked = 0;
         for f in curved() {
             let b = box_of(f);
-            // Rounding is the same here and where a place is asked, and keeps the order.
+            // Rounding is the same here and where a place is looked up, and keeps the order.
             let (low, high) = (cells.cell(b.min), cells.cell(b.max));
             marked += (0..3).map(|axis| high[axis] - low[axis] + 1).product::<usize>();
-            // Long facets across the grid, each in half of all cells: then no cell is told apart.
+            // Long facets across the grid, each in half of all cells: then no cell is distinguished.
             if marked > MOST_MARKED_OF_FACET * records.len() + MOST_MARKED {
                 cells.marks.fill(u64::MAX);
                 break;

@@ -1,6 +1,6 @@
 //! The facets at places that the spline alone answered.
 //!
-//! A ray that leaves a place of which no facet is known is asked of the spline, and so would be all that follow it on their path: in a rod
+//! A ray that leaves a place of which no facet is known is traced on the spline, and so would be all that follow it on their path: in a rod
 //! or an integrating sphere most segments.
 
 use super::limits::{OWN_POINT, PLACE_OF_SAGS};

@@ -1,4 +1,4 @@
-//! What polishing asks of a facet again and again, in half a cache line.
+//! What polishing reads of a facet again and again, in half a cache line.
 
 use super::limits::{BEND_OF_SAGS, HIDDEN_BENDS, no_sag};
 use crate::intersect::exact::Exact;
@@ -6,8 +6,8 @@ use crate::math::{FaceId, Ray, Uv};
 use crate::mesh::FacetMesh;
 use rustc_hash::FxHashMap;
 
-/// A ray whose sine to the facet that it leaves is above so many of the facet's bends is told by the facet's own normal: twice what a root
-/// may hide below.
+/// A ray whose sine to the facet that it leaves is above so many of the facet's bends is decided by the facet's own normal: twice what a
+/// root may hide below.
 const CLEAR_BENDS: f64 = 2.0 * HIDDEN_BENDS;
 /// The least sine for which that holds: a hundred times what `f32` rounds.
 const LEAST_CLEAR_SINE: f64 = 1e-5;

@@ -1,6 +1,6 @@
 //! The limits that several steps of polishing keep.
 
-/// A ray of no more than so many sags is asked of the spline: where it meets a face flat, the facet there lies farther
+/// A ray of no more than so many sags is traced on the spline: where it meets a face flat, the facet there lies farther
 /// away than the ray is long. Of light that grazes a rod glued in a hole the hole's face was not seen.
 pub(super) const SHORT_OF_SAGS: f64 = 4.0;
 /// A facet of less sag lies on the spline, mm: no root hides between them. See [`no_sag`].

@@ -3,9 +3,9 @@
 //! A facet hit carries the parameters of its place on the surface; Newton's method takes three or four steps from there, for eight hits
 //! at a time. The root that the ray leaves is recognised by face, parameters and place, and the search goes on behind it.
 //!
-//! The spline itself is asked where the facets may mislead: about a ray that leaves its surface so flat that its next root hides inside
-//! the sag, that starts between another face and that one's facets, or that is short; about a facet hit without a root nearby, inside
-//! the trims and crossed the same way; and about an answer that cannot be, because a ray that goes into a closed solid comes out of it, and
+//! The spline itself is queried where the facets may mislead: for a ray that leaves its surface so flat that its next root hides inside
+//! the sag, that starts between another face and that one's facets, or that is short; for a facet hit without a root nearby, inside
+//! the trims and crossed the same way; and for an answer that cannot be, because a ray that goes into a closed solid comes out of it, and
 //! the other way round. Without that a rod of 1 × 50 mm lost 8 % of its light and a ring 11 %.
 //!
 //! Guarantee: a hit marked [`Certainty::Polished`] lies on the spline within 1e-9 mm; any other is the spline's own answer, or of a ready
@@ -95,8 +95,8 @@ pub struct Polished<'a> {
 }
 
 impl<'a> Polished<'a> {
-    /// Wraps `facets`, an intersector over `mesh`, which must be made of the model that `exact` was built from: faces are told by their
-    /// number. Its normal mode counts for hits on ready meshes alone.
+    /// Wraps `facets`, an intersector over `mesh`, which must be made of the model that `exact` was built from: faces are identified by
+    /// their number. Its normal mode counts for hits on ready meshes alone.
     pub fn new(facets: &'a dyn Intersector, mesh: &'a FacetMesh, exact: &'a Exact) -> Self {
         let proved = mesh.sag.iter().copied().filter(|s| s.is_finite()).fold(0.0, f64::max);
         let sag = if mesh.sag.iter().any(|s| !s.is_finite()) || mesh.sag.is_empty() {
@@ -113,7 +113,7 @@ impl<'a> Polished<'a> {
 
     /// Answers rays on the spline and on ready meshes, which have none: overwrites `hits`, makes it as long as `rays`, and counts each ray
     /// once. A hit on the spline names its face but no facet ([`NO_FACET`]).
-    fn ask_truth(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>, cost: &mut Cost) {
+    fn trace_spline(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>, cost: &mut Cost) {
         hits.clear();
         hits.resize(rays.len(), None);
         cost.doubtful += rays.len() as u64;
@@ -172,7 +172,7 @@ impl Intersector for Polished<'_> {
         let Some(record) = self.records.get(from.primitive as usize).filter(|r| r.face == from.face) else {
             return false;
         };
-        // A root lies beside its facet's piece of the spline where the ray that found it came in flat. What the spline would be asked about
+        // A root lies beside its facet's piece of the spline where the ray that found it came in flat. What would be traced on the spline
         // is left to it, so that how many these are does not depend on what was prepared.
         record.decisive_sine(ray).is_some_and(|sine| sine > 0.0)
             && self.pieces[from.primitive as usize].contains(from.uv)

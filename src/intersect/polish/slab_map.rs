@@ -63,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_touches_a_marked_box_is_told() {
+    fn what_touches_a_marked_box_is_detected() {
         let bounds = Aabb { min: Point::new(-3.0, 10.0, 5.0), max: Point::new(13.0, 12.0, 37.0) };
         let mut map = SlabMap::new(bounds);
         let slabs = [[0.0, 11.0, 9.0, 0.4], [12.9, 11.5, 36.0, 2.0], [5.0, 10.0, 20.0, 0.0]];

@@ -2,7 +2,7 @@
 //!
 //! Facets leave the spline by up to their sag. A ray that starts between another face and that one's facets is, for these, already behind
 //! the face: beside the wall of a bore light that rises from the mirror below it went on between the wall and its facets, all along it,
-//! and into what stands behind. The facets of the face itself are told by the side to which the ray leaves.
+//! and into what stands behind. The facets of the face itself are sorted out by the side to which the ray leaves.
 //!
 //! Guarantee: a start that is in no slab of its facet is on the same side of the facets of all other faces as of their splines, where
 //! the sags are proved.
@@ -16,7 +16,7 @@ use crate::mesh::FacetMesh;
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
-/// A facet with more slabs near it has a map of them, which costs as much as asking so many.
+/// A facet with more slabs near it has a map of them, which costs as much as testing so many.
 const MOST_WITHOUT_MAP: usize = 2;
 /// One with more, as of a plate with many holes, has no list of them and looks for them in the tree.
 const MOST_LISTED: usize = 12;
@@ -196,7 +196,7 @@ impl Slab {
     }
 
     /// Whether a way touches the box and comes within the sag of the plane of one of the facet's triangles, as far as the box around it
-    /// and its ends tell.
+    /// and its ends show.
     #[inline(always)]
     fn meets(&self, mesh: &FacetMesh, [a, b]: [Point; 2]) -> bool {
         let (low, high) = (a.min(b), a.max(b));
@@ -224,12 +224,12 @@ fn range_along<const N: usize>(axis: Vector, origin: Point, places: [Point; N]) 
     [along.into_iter().fold(f64::INFINITY, f64::min), along.into_iter().fold(f64::NEG_INFINITY, f64::max)]
 }
 
-/// All places within a reach of a facet, for telling the slabs that no way between such places touches.
+/// All places within a reach of a facet, for finding the slabs that no way between such places touches.
 struct Surroundings {
     corners: [Point; 4],
     reach: f64,
     bounds: Aabb,
-    /// Along the normal of the facet's first triangle from its first corner, as the range of all these places; a normal of zero tells
+    /// Along the normal of the facet's first triangle from its first corner, as the range of all these places; a normal of zero says
     /// nothing.
     normal: Vector,
     range: [f64; 2],
@@ -289,7 +289,7 @@ mod tests {
         }
     }
 
-    /// What a map and a tree find is what asking every slab finds.
+    /// What a map and a tree find is what testing every slab finds.
     #[test]
     fn no_slab_is_hidden_by_the_map_of_a_facet() {
         let plate = sweep::plane(&Frame::IDENTITY, [[-10.0, 10.0]; 2]);
@@ -313,7 +313,7 @@ mod tests {
         assert!((200..2_000).contains(&met), "{met}");
     }
 
-    /// Of facets across one another, in all directions: what is told beforehand to be far from a facet is far from every way near it.
+    /// Of facets across one another, in all directions: what is found beforehand to be far from a facet is far from every way near it.
     #[test]
     fn no_way_near_a_facet_touches_a_slab_that_was_left_out() {
         let unit = |k: u32, m: f64| (f64::from(k) * m).fract();

@@ -1,4 +1,4 @@
-//! Which rays facets are asked about: those whose start is on the same side of the facets as of the spline.
+//! Which rays are traced on the facets: those whose start is on the same side of the facets as of the spline.
 
 use super::Polished;
 use super::clear_start::ClearStart;
@@ -15,7 +15,7 @@ pub(super) enum Side {
     Outward,
 }
 
-/// How facets are asked about a ray.
+/// How a ray is traced on the facets.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Start {
     /// How far before and behind its range it looks for facets, mm.
@@ -25,7 +25,7 @@ pub(super) struct Start {
 }
 
 impl Polished<'_> {
-    /// How facets are asked about a ray; `None` for one that the spline must be asked about, as it is short, names no facet of its face,
+    /// How a ray is traced on the facets; `None` for one that must be traced on the spline, as it is short, names no facet of its face,
     /// leaves so flat that its next root may hide from the facets, or starts between a face and its facets.
     #[inline(always)]
     pub(super) fn start(&self, ray: &Ray, clear: &[ClearStart]) -> Option<Start> {
@@ -46,13 +46,13 @@ impl Polished<'_> {
             let back = if is_near { slack } else { LOOK_BACK_OF_FLAT };
             return Some(Start { slack: [back, slack], side: None });
         };
-        // A departure from the spline alone names no facet, and one that names another face's tells nothing of the
+        // A departure from the spline alone names no facet, and one that names another face's says nothing of the
         // side that is left.
         let record = self.records.get(from.primitive as usize).filter(|r| r.face == from.face)?;
         let is_long = ray.t_max - ray.t_min > SHORT_OF_SAGS * self.sag;
         let place = ray.point_at(ray.t_min);
-        let is_told = is_long && self.is_told(from.primitive, from.uv, place);
-        if !is_told || self.slabs.meet(self.mesh, from.primitive, [place; 2]) {
+        let is_covered = is_long && self.is_covered(from.primitive, from.uv, place);
+        if !is_covered || self.slabs.meet(self.mesh, from.primitive, [place; 2]) {
             return None;
         }
         let sine = match record.decisive_sine(ray) {
@@ -63,10 +63,10 @@ impl Polished<'_> {
         Some(Start { slack: [slack / sine.abs().max(LEAST_SLACK_SINE); 2], side: Some(side) })
     }
 
-    /// Whether a place, mm, of the spline with its parameters is so near to a facet that [`Slabs::meet`] speaks of it: on the facet's own
+    /// Whether a place, mm, of the spline with its parameters is so near to a facet that [`Slabs::meet`] covers it: on the facet's own
     /// piece, or within reach. Of a ray that came in flat the root lies beside the piece.
     #[inline(always)]
-    pub(super) fn is_told(&self, facet: u32, uv: Uv, place: Point) -> bool {
+    pub(super) fn is_covered(&self, facet: u32, uv: Uv, place: Point) -> bool {
         self.pieces[facet as usize].contains(uv) || {
             let [a, b, c, d] = self.mesh.corners(facet as usize);
             let distance = distance_to_triangle(place, [a, b, c]).min(distance_to_triangle(place, [a, c, d]));
@@ -78,7 +78,7 @@ impl Polished<'_> {
     /// root may hide between the spline and the facet, or nothing is known of the spline.
     ///
     /// On the way to such a root the sine to the surface turns from the one at the start to its negative, and it does so within about a
-    /// facet; as far as the normals at the corners tell, it must not.
+    /// facet; as far as the normals at the corners show, it must not.
     fn sine_of_spline(&self, ray: &Ray, from: &Departure) -> Option<f64> {
         let facet = from.primitive as usize;
         let sines =

@@ -119,7 +119,7 @@ impl<'a> PatchClipping<'a> {
                 continue;
             }
             let size = piece.net.domain.map(|[lo, hi]| hi - lo).into_iter().fold(0.0, f64::max);
-            // Large boxes seldom hold a single root provably, and asking costs as much as a few cuts.
+            // Large boxes seldom hold a single root provably, and the test costs as much as a few cuts.
             if size < SMALL && self.take_single_root(&piece.net, out) {
                 continue;
             }

@@ -20,7 +20,7 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Half an angle below which a cone is of no use.
 const LEAST_HALF_ANGLE: f64 = 0.02;
-/// Taken off the half angle for the rounding of starts and of what is asked in f32.
+/// Taken off the half angle for the rounding of starts and of queries in f32.
 const ANGLE_ROOM: f64 = 1e-3;
 
 /// By how much balls are made larger, for the rounding of distances in f64 and much more.
@@ -148,7 +148,7 @@ impl Base {
                 }
                 Target::Block(index, count) => {
                     let block = &tree.blocks[index];
-                    // Its own facet is asked separately, triangle by triangle.
+                    // Its own facet is tested separately, triangle by triangle.
                     for k in (0..count).filter(|&k| block.facets[k] as usize != facet) {
                         let other = block.facets[k] as usize;
                         if let Some(sheet) = sheet.filter(|sheet| sheet.holds(other)) {
@@ -263,7 +263,7 @@ impl Base {
             for t in &self.corners {
                 let way = *q - *t;
                 // A difference within the reach of a start is the same point, as at a shared edge: no normal is
-                // asked to keep off that.
+                // required to keep off that.
                 if way.length_squared() > self.reach * self.reach && count < ways.len() {
                     ways[count] = way;
                     count += 1;

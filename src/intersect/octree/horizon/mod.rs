@@ -3,7 +3,7 @@
 //! Light leaves a lens, a cover or an open reflector by such rays, one in three to one in five of all, and to find out by walking
 //! that nothing is there costs as much as a hit. The rays of a facet mostly leave it within a narrow cone: from the first few of
 //! them an axis is taken and how wide the cone around it is that nothing stands in ([`cone`]), which one product of two directions
-//! then tells of a ray. Where many rays leave beside their cone, how high anything stands to all sides is found ([`skyline`]).
+//! then decides for a ray. Where many rays leave beside their cone, how high anything stands to all sides is found ([`skyline`]).
 //!
 //! Rays that leave the spline start up to a sag off their facet: for these cones with room for it are found apart ([`cone`], [`sheet`]).
 //!

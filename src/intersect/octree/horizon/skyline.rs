@@ -20,7 +20,7 @@ const STEEPEST_OF_USE: f64 = 8.0;
 const UPRIGHT: f32 = 1e-6;
 /// Half a sector is widened by this much, radians, for f32 coordinates at [`UPRIGHT`].
 const SECTOR_ROOM: f64 = 1e-3;
-/// Relative room on squared slopes for the rounding of what is asked in f32.
+/// Relative room on squared slopes for the rounding of queries in f32.
 const SLOPE_ROOM: f64 = 1e-4;
 /// Absolute room on squared slopes, for slopes near zero.
 const UPRIGHT_ROOM: f64 = 1e-6;
@@ -33,7 +33,7 @@ pub(super) fn sector(x: f32, y: f32) -> usize {
     usize::from(x < 0.0) | usize::from(y < 0.0) << 1 | usize::from(y.abs() > x.abs()) << 2
 }
 
-/// What is asked of a ray that leaves a facet, which may do so from either triangle.
+/// What a ray that leaves a facet is tested against, which may do so from either triangle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Horizon([Skyline; 2]);
 
@@ -62,7 +62,7 @@ impl Skyline {
         let dot = |a: [f32; 3]| a[0] * d[0] + a[1] * d[1] + a[2] * d[2];
         let (up, x, y) = (dot(self.normal), dot(self.x), dot(self.y));
         let flat2 = x * x + y * y;
-        // Nearly upright the sector is a matter of rounding, and one told wrongly would give another's slope: the steepest of all is
+        // Nearly upright the sector is a matter of rounding, and one chosen wrongly would give another's slope: the steepest of all is
         // right for any.
         let upright = flat2 < UPRIGHT;
         let slope2 = if upright { self.steepest } else { self.slope2[sector(x, y)] };

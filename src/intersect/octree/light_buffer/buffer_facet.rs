@@ -1,4 +1,4 @@
-//! Facets as the rays of a source ask them.
+//! Facets as the rays of a source are tested against them.
 
 use super::view::View;
 use crate::intersect::facet::{FacetRay, Line, Nearest};
@@ -6,7 +6,7 @@ use crate::intersect::octree::facet_pair::Corners;
 use crate::math::{Point, Ray, huge_pages};
 use crate::mesh::FacetMesh;
 
-/// A facet with its corners, axis by axis in the order of the rays' axes: two lines of the cache hold all that a test asks for, where
+/// A facet with its corners, axis by axis in the order of the rays' axes: two lines of the cache hold all that a test needs, where
 /// its corners in the mesh are four places behind four indices.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
@@ -18,7 +18,7 @@ pub(super) struct BufferFacet {
 }
 
 impl BufferFacet {
-    /// A facet as the rays on one side of the buffer ask it, of which it needs no more than their axes.
+    /// A facet as the rays on one side of the buffer are tested against it, of which it needs no more than their axes.
     fn new(mesh: &FacetMesh, facet: u32, view: &View, side: usize) -> Self {
         let axes = view.axes(side);
         let positions = mesh.corner_positions(facet as usize);

@@ -123,7 +123,7 @@ pub(super) fn draw_expected(
 /// buffer has its source. `buffers` must not be empty.
 #[inline(always)]
 fn buffer_showing(buffers: &[LightBuffer], last: usize, ray: &Ray) -> Option<usize> {
-    // A ray that leaves a face starts elsewhere, and one whose range begins later must not be told of facets
+    // A ray that leaves a face starts elsewhere, and one whose range begins later must not be given facets
     // before.
     if ray.departure.is_some() | (ray.t_min != 0.0) {
         return None;
@@ -159,7 +159,7 @@ pub(super) fn answer<L: Lanes>(
     let mut edges = Edges::default();
     let mut found: [(&[Entry], u8); LOOKUP_BATCH] = [(&[], 0); LOOKUP_BATCH];
     while next < rays.len() {
-        // In rounds, each of which asks for the memory that the next one needs: first squares, then entries,
+        // In rounds, each of which prefetches the memory that the next one needs: first squares, then entries,
         // facets, and at last the tests.
         let mut n = 0;
         while n < LOOKUP_BATCH && next < rays.len() {

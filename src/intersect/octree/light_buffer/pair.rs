@@ -1,6 +1,6 @@
-//! Two facets of a light buffer asked at once.
+//! Two facets of a light buffer tested at once.
 //!
-//! A square holds two facets where the buffer is not divided further, and which of them is met is a matter of chance: asked one after
+//! A square holds two facets where the buffer is not divided further, and which of them is met is a matter of chance: tested one after
 //! the other, what the processor guesses wrong costs more than the test of the second. The arithmetic is that of [`Line::test_quad`], step
 //! by step, so that the hits are the same; where an edge function is zero that decides.
 
