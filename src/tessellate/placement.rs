@@ -154,14 +154,13 @@ fn drop_unused(mesh: &mut FacetMesh) {
     for v in mesh.facets.iter().flat_map(|f| f.vertices) {
         name[mesh.vertices[v as usize].position as usize] = 0;
     }
-    let mut kept = huge_pages::with_capacity(mesh.positions.len());
-    for (slot, &p) in name.iter_mut().zip(&mesh.positions) {
-        if *slot == 0 {
-            *slot = kept.len() as u32;
-            kept.push(p);
-        }
-    }
-    mesh.positions = kept;
+    let (mut names, mut kept) = (name.iter_mut(), 0);
+    mesh.positions.retain(|_| {
+        let Some(name) = names.next().filter(|name| **name == 0) else { return false };
+        *name = kept;
+        kept += 1;
+        true
+    });
     for v in &mut mesh.vertices {
         // A corner without facets can only come with a ready mesh; it may point anywhere.
         v.position = name[v.position as usize].min(mesh.positions.len().saturating_sub(1) as u32);
