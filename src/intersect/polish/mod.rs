@@ -4,7 +4,7 @@
 //! at a time. The root that the ray leaves is recognised by face, parameters and place, and the search goes on behind it.
 //!
 //! The spline itself is queried where the facets may mislead: for a ray that leaves its surface so flat that its next root hides inside
-//! the sag, that starts between another face and that one's facets, or that is short; for a facet hit without a root nearby, inside
+//! the sag, that starts between a face and its facets, or that is short; for a facet hit without a root nearby, inside
 //! the trims and crossed the same way; and for an answer that cannot be, because a ray that goes into a closed solid comes out of it, and
 //! the other way round. Without that a rod of 1 × 50 mm lost 8 % of its light and a ring 11 %.
 //!

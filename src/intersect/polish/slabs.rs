@@ -11,7 +11,7 @@ use super::curved_cells::FLAT_SAG;
 use super::facet_record::FacetRecord;
 use super::slab_map::SlabMap;
 use crate::intersect::prefetch;
-use crate::math::{Aabb, BoxTree, Point, Vector};
+use crate::math::{Aabb, BoxTree, FaceId, Point, Vector};
 use crate::mesh::FacetMesh;
 use rayon::prelude::*;
 use smallvec::SmallVec;
@@ -143,22 +143,22 @@ impl Slabs {
     fn any_nearby_meets(&self, mesh: &FacetMesh, facet: u32, way: [Point; 2]) -> bool {
         let Nearby { first, count, .. } = self.nearby[facet as usize];
         if count == 0 {
-            return self.any_meets(mesh, facet, way);
+            return self.any_meets(mesh, Some(mesh.facets[facet as usize].face), way);
         }
         self.listed[first as usize..(first + count) as usize].iter().any(|slab| slab.meets(mesh, way))
     }
 
-    /// Whether a way touches a slab of another face than this facet's.
-    fn any_meets(&self, mesh: &FacetMesh, facet: u32, way: [Point; 2]) -> bool {
-        self.tree.any_meeting(&Aabb::from_points(way), |k| {
-            let slab = &self.all[k as usize];
-            mesh.facets[slab.facet as usize].face != mesh.facets[facet as usize].face && slab.meets(mesh, way)
-        })
-    }
-
     /// Whether a place lies in the slab of any facet.
     pub(super) fn hold(&self, mesh: &FacetMesh, place: Point) -> bool {
-        self.tree.any_meeting(&Aabb::from_points([place]), |k| self.all[k as usize].meets(mesh, [place; 2]))
+        self.any_meets(mesh, None, [place; 2])
+    }
+
+    /// Whether a way touches a slab of any face but this one.
+    fn any_meets(&self, mesh: &FacetMesh, but: Option<FaceId>, way: [Point; 2]) -> bool {
+        self.tree.any_meeting(&Aabb::from_points(way), |k| {
+            let slab = &self.all[k as usize];
+            Some(mesh.facets[slab.facet as usize].face) != but && slab.meets(mesh, way)
+        })
     }
 
     /// How far from its facet, mm, a place may lie of which [`Self::meet`] speaks.
@@ -262,7 +262,7 @@ impl Surroundings {
 mod tests {
     use super::*;
     use crate::intersect::exact::{Exact, Settings};
-    use crate::math::{FaceId, Frame, Uv};
+    use crate::math::{Frame, Uv};
     use crate::mesh::{Facet, MeshVertex};
     use crate::model::{Face, Model, Part, Shell};
     use crate::nurbs::sweep;
