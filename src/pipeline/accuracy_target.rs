@@ -72,11 +72,11 @@ pub fn settings_for_accuracy(
     let found = in_stage(monitor, Stage::Aiming, || match &bound {
         None => meet_target(model, &source, &ask, &progress),
         Some((scene, bound)) => {
-            let rays = |traced_on: &dyn Intersector, seed: u64, count: u64| {
-                let settings = RunSettings { rays: count, seed, path_samples: 0, ..RunSettings::from(&scene.run) };
-                scene_rays(traced_on, model, &settings, bound)
-            };
             let settings = RunSettings::from(&scene.run);
+            let rays = |traced_on: &dyn Intersector, seed: u64, count: u64| {
+                let run = RunSettings { rays: count, seed, path_samples: 0, ..settings.clone() };
+                scene_rays(traced_on, model, &run, bound)
+            };
             let media = MediaBeside::new(bound, source.exact(), &settings);
             let light = JobLight { rays: &rays, index_ratio: &|ray, hit| media.index_ratio(ray, hit) };
             meet_target_for_light(model, &source, &ask, light, &progress)
