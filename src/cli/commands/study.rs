@@ -49,31 +49,28 @@ struct StudyResult {
     extra_rows: Vec<(&'static str, Value)>,
     /// The seed that a scene traced with; `None` for that of the command.
     seed: Option<u64>,
-    completion: Completion,
+}
+
+/// The model of a study.
+struct StudyModel {
+    /// `None` for a STEP file alone.
+    scene: Option<Scene>,
+    loaded: LoadedModel,
+    /// For the rows.
+    name: String,
 }
 
 impl StudyResult {
     /// Makes the result of rows and the sentence about them; fails where rows have no form as JSON.
     fn new(rows: &impl Serialize, answer: impl Into<String>) -> Result<Self, Failure> {
         let rows = json_value(rows)?;
-        Ok(Self {
-            rows,
-            answer: answer.into(),
-            extra_rows: Vec::new(),
-            seed: None,
-            completion: Completion::Complete,
-        })
+        Ok(Self { rows, answer: answer.into(), extra_rows: Vec::new(), seed: None })
     }
 
     /// Adds a further table under a name of its own.
     fn with_rows(mut self, name: &'static str, rows: &impl Serialize) -> Result<Self, Failure> {
         self.extra_rows.push((name, json_value(rows)?));
         Ok(self)
-    }
-
-    /// Says what could not be read of the model; incomplete where that is any face.
-    fn about(self, loaded: &LoadedModel, console: &Console) -> Self {
-        Self { completion: input_files::report_refusals(loaded, 0.0, console), ..self }
     }
 }
 
@@ -90,10 +87,16 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
     require_report_space(&folder, command.report.is_wanted())?;
     let bar = console.stage_bar(command.kind.name());
     let progress = |p: Progress| show_progress(&bar, &p);
-    let mut shapes = Vec::new();
+    let (mut completion, mut shapes, mut shown) = (Completion::Complete, Vec::new(), None);
+    let mut read = || -> Result<StudyModel, Failure> {
+        let model = read_model(command.file, console)?;
+        // Before the bar is drawn.
+        completion = input_files::report_refusals(&model.loaded, 0.0, console);
+        Ok(model)
+    };
     let found = match command.kind {
-        StudyKind::Accuracy => study_accuracy(command, seed, console, &progress)?,
-        StudyKind::Interpolation => study_interpolation(command, seed, console, &progress)?,
+        StudyKind::Accuracy => study_accuracy(command, shown.insert(read()?), seed, &progress)?,
+        StudyKind::Interpolation => study_interpolation(command, &read()?, seed, &progress)?,
         StudyKind::Complexity => study_complexity(command, seed, threads, &progress)?,
         StudyKind::Stability => study_stability(&progress)?,
         StudyKind::Bvh => {
@@ -106,11 +109,10 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
                 tracing: &command.tracing,
             };
             let benchmark = super::bvh_benchmark::run(&benchmark, console, &progress)?;
-            shapes = benchmark.shapes;
-            let found = StudyResult::new(&benchmark.rows, benchmark.answer)?;
-            StudyResult { completion: benchmark.completion, ..found }
+            (completion, shapes) = (benchmark.completion, benchmark.shapes);
+            StudyResult::new(&benchmark.rows, benchmark.answer)?
         }
-        StudyKind::Effects => study_effects(command, threads, console, &progress)?,
+        StudyKind::Effects => study_effects(command, &read()?, threads, console, &progress)?,
     };
     bar.finish_and_clear();
     let seed = found.seed.unwrap_or(seed);
@@ -132,9 +134,9 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
     let text = json_text(&document)?;
     write_atomic(&folder.join("study.json"), |w| w.write_all(text.as_bytes()))?;
     let mut report = study_report(&document, provenance);
-    if command.kind == StudyKind::Accuracy {
+    if let Some(model) = &shown {
         // Behind the front, before the times.
-        report.sections.insert(1, error_view(command, console)?);
+        report.sections.insert(1, error_view(command, model, console)?);
     }
     if command.kind == StudyKind::Bvh {
         report.sections.insert(1, octree_shape::octree_section(&shapes));
@@ -154,19 +156,19 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
         }
         console.say(format_args!("  {}", folder.join("study.json").display()));
     }
-    Ok(found.completion)
+    Ok(completion)
 }
 
-/// Returns the model of the file or the built-in lamp, its scene if it has one, and a name for the rows.
-fn read_model(file: Option<&Path>, console: &Console) -> Result<(Option<Scene>, LoadedModel, String), Failure> {
+/// Reads the model of the file; the built-in lamp without one.
+fn read_model(file: Option<&Path>, console: &Console) -> Result<StudyModel, Failure> {
     let Some(path) = file else {
         let (scene, loaded) = demo::lamp()?;
-        return Ok((Some(scene), loaded, "three-cavity lamp".into()));
+        return Ok(StudyModel { scene: Some(scene), loaded, name: "three-cavity lamp".into() });
     };
     let name = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
     Ok(match input_files::scene_or_model(path, PlacedLimit::default(), console)? {
-        Input::Step(loaded) => (None, loaded, name),
-        Input::Scene(scene, loaded) => (Some(*scene), loaded, name),
+        Input::Step(loaded) => StudyModel { scene: None, loaded, name },
+        Input::Scene(scene, loaded) => StudyModel { scene: Some(*scene), loaded, name },
     })
 }
 
@@ -176,11 +178,10 @@ type Report<'a> = &'a (dyn Fn(Progress) + Sync);
 /// Measures cost and accuracy over tolerances, normals and intersectors; for a scene, also what facets change of each receiver.
 fn study_accuracy(
     command: &StudyCommand,
+    StudyModel { scene, loaded, name }: &StudyModel,
     seed: u64,
-    console: &Console,
     progress: Report,
 ) -> Result<StudyResult, Failure> {
-    let (scene, loaded, name) = read_model(command.file, console)?;
     // Measured, because the study reports the sag reached and not the one asked for.
     let product = ModelMeshSource::measuring(&loaded.model);
     let mut settings = accuracy::Settings { seed, ..Default::default() };
@@ -189,9 +190,8 @@ fn study_accuracy(
     }
     settings.rays = command.tracing.rays().unwrap_or(settings.rays);
     let Some(scene) = scene else {
-        let study = accuracy::accuracy(&name, &product, &settings, progress);
-        let found = StudyResult::new(&study.rows, study.answer)?.with_rows("slopes", &study.slopes)?;
-        return Ok(found.about(&loaded, console));
+        let study = accuracy::accuracy(name, &product, &settings, progress);
+        return StudyResult::new(&study.rows, study.answer)?.with_rows("slopes", &study.slopes);
     };
     let bound = scene.bind(&loaded.model)?;
     let own = RunSettings::from(&scene.run);
@@ -199,15 +199,13 @@ fn study_accuracy(
     let run = RunSettings { rays: own.rays.min(SCENE_RAYS), seed, threads: 0, path_samples: 0, ..own };
     // Light needs no sag, and measuring takes as long as meshing.
     let plain = ModelMeshSource::new(&loaded.model);
-    let (study, light) = study::scene_accuracy(&name, [&product, &plain], (&bound, &run), &settings, progress);
-    let found = StudyResult::new(&study.rows, study.answer)?;
-    Ok(found.with_rows("slopes", &study.slopes)?.with_rows("receivers", &light)?.about(&loaded, console))
+    let (study, light) = study::scene_accuracy(name, [&product, &plain], (&bound, &run), &settings, progress);
+    StudyResult::new(&study.rows, study.answer)?.with_rows("slopes", &study.slopes)?.with_rows("receivers", &light)
 }
 
-/// Makes the section with a view of where on the surface the normals err, on facets of the tolerance asked for: reads and meshes the
-/// model again.
-fn error_view(command: &StudyCommand, console: &Console) -> Result<Section, Failure> {
-    let (scene, loaded, _) = read_model(command.file, console)?;
+/// Makes the section with a view of where on the surface the normals err, on facets of the tolerance asked for: meshes the model again.
+fn error_view(command: &StudyCommand, model: &StudyModel, console: &Console) -> Result<Section, Failure> {
+    let StudyModel { scene, loaded, .. } = model;
     let settings = mesh_settings(&command.meshing, scene.as_ref(), &loaded.model)?;
     let (made, _) = tessellate_model(&loaded.model, &settings, &TerminalMonitor::new(console));
     let (errors, _) = study::facet_errors(&loaded.model, &made.mesh);
@@ -226,14 +224,13 @@ fn error_view(command: &StudyCommand, console: &Console) -> Result<Section, Fail
 /// Measures the kinds of normals on the model of the file or, without one, on all built-in ones.
 fn study_interpolation(
     command: &StudyCommand,
+    StudyModel { loaded, name, .. }: &StudyModel,
     seed: u64,
-    console: &Console,
     progress: Report,
 ) -> Result<StudyResult, Failure> {
-    let (_, loaded, name) = read_model(command.file, console)?;
     // Without a file all models that are built in, to show how the ratios vary.
     let lamps = if command.file.is_none() { study::lamp::lamps() } else { Vec::new() };
-    let mut models: Vec<(String, &Model)> = vec![(name, &loaded.model)];
+    let mut models: Vec<(String, &Model)> = vec![(name.clone(), &loaded.model)];
     models.extend(lamps.iter().map(|l| (format!("{} lamp", l.name), &l.model)));
     let products: Vec<ModelMeshSource> = models.iter().map(|(_, m)| ModelMeshSource::new(m)).collect();
     let named: Vec<(&str, &dyn MeshSource)> =
@@ -241,7 +238,7 @@ fn study_interpolation(
     let mut settings = interpolation::Settings { seed, ..Default::default() };
     settings.rays = command.tracing.rays().unwrap_or(settings.rays);
     let study = interpolation::interpolation(&named, &settings, progress);
-    Ok(StudyResult::new(&study.rows, study.answer)?.about(&loaded, console))
+    StudyResult::new(&study.rows, study.answer)
 }
 
 /// Compares the spline, traced the traditional way and ours, with facets on three built-in lamps.
@@ -326,27 +323,26 @@ fn study_stability(progress: Report) -> Result<StudyResult, Failure> {
 /// Measures what each optical effect costs on a scene, with at most a million rays unless `--rays` says more; fails for a bare model.
 fn study_effects(
     command: &StudyCommand,
+    StudyModel { scene, loaded, name }: &StudyModel,
     threads: usize,
     console: &Console,
     progress: Report,
 ) -> Result<StudyResult, Failure> {
-    let (scene, loaded, name) = read_model(command.file, console)?;
     let Some(scene) = scene else {
         let failure = Failure::arguments("study effects needs a scene: a STEP file alone has no light");
         return Err(failure.with_help("give a scene file (.toml), or nothing for the built-in lamp"));
     };
     let bound = scene.bind(&loaded.model)?;
-    let settings = mesh_settings(&command.meshing, Some(&scene), &loaded.model)?;
+    let settings = mesh_settings(&command.meshing, Some(scene), &loaded.model)?;
     let (made, _) = tessellate_model(&loaded.model, &settings, &TerminalMonitor::new(console));
-    let choice = IntersectorChoice::new(&command.tracing, Some(&scene))?;
-    refuse_facet_normals(&command.tracing, Some(&scene))?;
+    let choice = IntersectorChoice::new(&command.tracing, Some(scene))?;
+    refuse_facet_normals(&command.tracing, Some(scene))?;
     let mut run = RunSettings { threads, ..RunSettings::from(&scene.run) };
     run.rays = command.tracing.rays().unwrap_or(run.rays.min(1_000_000));
     run.seed = command.tracing.seed.unwrap_or(run.seed);
     let rows =
         with_intersector(choice, &loaded.model, &made.mesh, &TerminalMonitor::new(console), |intersector, _| {
-            effects::effects(&name, (&bound, &run), intersector, EFFECT_ROUNDS, progress)
+            effects::effects(name, (&bound, &run), intersector, EFFECT_ROUNDS, progress)
         });
-    let found = StudyResult::new(&rows, effects::answer(&rows))?.about(&loaded, console);
-    Ok(StudyResult { seed: Some(run.seed), ..found })
+    Ok(StudyResult { seed: Some(run.seed), ..StudyResult::new(&rows, effects::answer(&rows))? })
 }
